@@ -48,7 +48,7 @@ torture: $(VENV)/.installed-test  ## files damaged, 4,400 in all, disks filled, 
 	HEDGEBED_DAMAGES=200 $(PYTEST) -m "long or slow or not long" tests/faults/test_damage.py tests/faults/test_damaged_folders.py tests/faults/test_damaged_lammps.py tests/faults/test_disk.py $(ARGS)
 	HEDGEBED_KILLS=50 HEDGEBED_KILLED_KEPT=$(abspath $(KILLED)) $(PYTEST) -m "long or slow" tests/faults/test_killed.py $(ARGS)
 
-tiers: $(VENV)/.installed-test  ## measure again how long each file of tests takes (tests/durations.toml)
+tiers: $(VENV)/.installed-test  ## measure again how long each file of tests takes (tests/durations.toml; ARGS="FILE ..." for new ones)
 	$(PYTEST) --write-durations $(ARGS)
 
 cover: $(VENV)/.installed-test  ## the tests of `make test`, counting the lines they reach: several times as long

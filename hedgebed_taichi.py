@@ -1,8 +1,8 @@
 """The one module of ours that imports Taichi; all others write ``from hedgebed_taichi import ti``.
 
 The variable HEDGEBED_TAICHI chooses what `ti` is: ``taichi``, or ``quadrants``, a fork of it. Where it is not set, `ti`
-is Taichi, or the fork where Taichi's compiler does not know the processor and the fork is installed
-(``pip install quadrants``). docs/performance.md compares the two. Nothing is imported before `ti` is asked for.
+is Taichi. Where Taichi's compiler does not know the processor and the fork is installed (``pip install quadrants``),
+`ti` is the fork. docs/performance.md compares the two. Nothing is imported before `ti` is asked for.
 
 Imports nothing of ours.
 """

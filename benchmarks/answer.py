@@ -2,8 +2,8 @@
 
 The race's bed and material, gravity straight down, float64, the same step. Ours lets grains sleep, and makes the whole
 push. LAMMPS makes the first part of it (``part``), and its time for the whole is that times the steps. Over that part
-our bed runs once more with all grains awake, so that a difference of the two codes and one of sleep are told apart.
-Settling, and making the bed, count in none.
+our bed runs once more with all grains awake. This separates a difference of the two codes from one of sleep. Settling,
+and making the bed, count in none.
 
 Options: --grains, --radius, --depth [m], --speed [m/s], --part (share of the depth), --settle (steps), --points (means
 of the force over the depth), --threads (0: all cores).

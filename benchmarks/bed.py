@@ -1,8 +1,8 @@
 """``hedgebed bench bed``: the bed of grains against LIGGGHTS, LAMMPS and YADE, on the same grains, with the same work.
 
 The entrants run in turn, several rounds, in one go, because a machine drifts; medians are quoted. The first round has
-every skin of the peers' neighbour lists; a peer goes on with its fastest, and with any that is nearly as fast, and not
-at all where it is slower than half the fastest. There are two races in one: without rolling resistance and with it.
+every skin of the peers' neighbour lists. A peer continues with its fastest, and with any that is nearly as fast. A peer
+that is slower than half the fastest ends there. There are two races in one: without rolling resistance and with it.
 What is only shown (other laws, one thread, float32) runs once. A peer whose bed ends up in another state than ours did
 other work: it is said, and not counted.
 

@@ -7,8 +7,8 @@ ground answers with its mean force F. So F H and F (velocity) H are exact. A fre
     z'    = z + u H
     v'    = v + (W - F) H / m                  F: the mean force of the step just done
 
-which is of second order in H, and exact in free fall. Time is 0 where the tip meets the undisturbed surface, depth 0;
-before that the spike is carried at its speed (phase "free"), from just clear of the grains that stick out. `state` and
+which is of second order in H, and exact in free fall. Time is 0 where the tip meets the undisturbed surface, depth 0.
+Before that the spike is carried at its speed (phase "free"), from just clear of the grains that stick out. `state` and
 `restore` work between any two macro steps: a continued run is bitwise equal to an unbroken one.
 """
 

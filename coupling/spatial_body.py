@@ -10,7 +10,7 @@ length H, s the ground's lag (0 for a law, its own step for a bed):
 
 P and L belong to a time s / 2 later than r and q. Under a Coulomb bound the sticking tips share the holding force in
 proportion to their loads, f_k = N_k (c + b z x (rho_k - mean rho)). So at the step's end their mean slip and their
-turning about the vertical are zero; one beyond mu_s N_k slides with mu_d N_k until its slip turns back
+turning about the vertical are zero. A tip beyond mu_s N_k slides with mu_d N_k until its slip turns back
 (docs/platform.md). Events of friction are of first order in H.
 """
 

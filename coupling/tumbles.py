@@ -1,8 +1,9 @@
 """Several tumbles in a row on one ground, and a landing: `CoupledTumble` with another beginning or end.
 
-Several tumbles: the torque acts until the platform has turned by `turn` times half the angle between two rows (1: its
-middle is over the leading row, from where it falls by itself); then the platform comes to rest, which is noted, and the
-next begins. The wheel keeps its speed. A landing starts just clear of the ground with the velocities of its fall.
+Several tumbles: the torque acts until the platform has turned by `turn` times half the angle between two rows. At 1 its
+middle is over the leading row, from where it falls by itself. Then the platform comes to rest, which is noted, and the
+next tumble begins. The wheel keeps its speed. A landing starts just clear of the ground with the velocities of its
+fall.
 """
 
 import math

@@ -1,7 +1,7 @@
 """A tumble of the planar platform on any ground: placed, released, turned over by its flywheel.
 
 On a bed the platform is first lowered until the sand carries it. On request this is under a larger gravity, which then
-falls to the run's (`coupling.lowered_gravity`); then time is 0, the torque begins and the energy balance starts.
+falls to the run's (`coupling.lowered_gravity`). Then time is 0, the torque begins and the energy balance starts.
 """
 
 import math
@@ -207,8 +207,8 @@ class CoupledTumble(PlatformRun):
     def trajectory(self) -> Trajectory:
         """As the planar model's integrators give it, what the ground holds as stored energy.
 
-        `dissipated` is what the ground took less what it holds more than at the start, at every row; of a bed that is
-        measured as well, at the times of `samples` (`losses`).
+        `dissipated` is what the ground took less what it holds more than at the start, at every row. On a bed the
+        losses are measured too, at the times of `samples` (`losses`).
         """
         rows = self.columns
         tally = Tally(self.trial, rows["x"][0], rows["y"][0], 0.0)

@@ -15,7 +15,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from .checks import read_toml
+from .checks import read_toml, why_unread
 from .digests import check_as_written
 from .ground.grounds import SurfaceGround
 from .ground.laws import SurfaceLaw, find_law
@@ -192,6 +192,9 @@ def read_ground(path: str | Path) -> GroundFile:
     same is raised for the file of a run that is not as the run wrote it.
     """
     path = Path(path)
+    if not path.exists():
+        why = f"a ground.toml of `hedgebed ground` or `calibrate` was expected: {why_unread(path, FileNotFoundError())}"
+        raise ValueError(f"ground = {path}: cannot be read, {why}")
     check_as_written(path)
     table = read_toml(path)
     try:

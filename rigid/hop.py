@@ -1,8 +1,8 @@
 """Hop theory: how a platform leaves the ground under its flywheel, and how far it flies.
 
-Launch. The platform turns about the row of tips ahead of it, on rigid ground: beta is the angle between the vertical
-and the line from there to the centre (pi/8 at rest); omega the clockwise turning rate; x forward, y up; M is the
-inertia in y (m free, m + m_b in a rig); s = sin beta, c = cos beta. While the tips stick
+Launch. The platform turns about the row of tips ahead of it, on rigid ground. beta is the angle between the vertical
+and the line from there to the centre (pi/8 at rest). omega is the clockwise turning rate; x points forward, y up. M is
+the inertia in y (m free, m + m_b in a rig); s = sin beta, c = cos beta. While the tips stick
 
     (J + m l^2 c^2 + M l^2 s^2) omega' = tau - W l s + (M - m) l^2 s c omega^2
 
@@ -11,11 +11,11 @@ and while they slide back under F = mu_d N
     (J + M l^2 s (s + mu_d c)) omega' = tau - l (s + mu_d c) (W - M l c omega^2)
 
 with N = W + M y'', y'' = l (s omega' - c omega^2). The platform leaves where N comes to 0. This is the planar model
-(Reid et al., i-SAIRAS 2014, from its energies) for K to infinity; a ground that gives launches more steeply where tips
-hold, and faster where they slide.
+(Reid and others, i-SAIRAS 2014, from its energies) for K to infinity. A compliant ground launches more steeply where
+tips hold, and faster where they slide.
 
 Angles. In a sudden launch the ground gives one impulse within its cone of friction. So a launch whose tips do not slide
-cannot be flatter than pi/2 - atan(mu_s). This friction-cone condition is ours; it is not compared with the hop angles
+cannot be flatter than pi/2 - atan(mu_s). This friction-cone condition is ours. It is not compared with the hop angles
 of Koenig, Pavone, Castillo-Rogez and Nesnas (ICRA 2014), whose formulas we have not read (docs/platform.md).
 
 Flight. On a flat ground a parabola, on a round body of radius R and surface gravity g an ellipse about its centre.
@@ -128,7 +128,7 @@ def launch(tumbler: Tumbler, torque: float, until: float = math.inf) -> Launch |
 
     None where it does not leave the ground before the next tips come down: it tumbles, falls back, or does not tip at
     all. Raises ValueError for a torque or a time of 0 or less. Raises RuntimeError where sliding on rigid ground has no
-    solution because friction is too high (above about 2, in a rig), UnfitSettingsError for too large a torque.
+    solution because friction is too high (above about 2, in a rig). Raises UnfitSettingsError for too large a torque.
     """
     check_above_zero(torque=torque, **({"until": until} if until != math.inf else {}))
     if torque <= tumbler.tipping_torque:

@@ -9,9 +9,9 @@ are those of a measured trial:
   where the window is 0). Body x in the world is (cos theta, -sin theta), body y (sin theta, cos theta).
 - wheel: |omega_w|.
 
-The mean over the window is exact through jumps of the force: with R the turn from body to world axes, the mean of
-R^T a is taken by parts, [R^T v] - integral of dR^T/dt v, which asks only for v, theta and omega, all continuous. So a
-motion sampled at `sensor_times` needs no acceleration at all, unless the window is 0.
+The mean over the window is exact through jumps of the force: with R the turn from body to world axes, the mean of R^T a
+is taken by parts, [R^T v] - integral of dR^T/dt v. This needs only v, theta and omega, all continuous. So a motion
+sampled at `sensor_times` needs no acceleration at all, unless the window is 0.
 """
 
 import math

@@ -66,8 +66,15 @@ def heavy_files(durations: dict[str, float]) -> set[str]:
     return heavy
 
 
+def merged(durations: dict[str, float], measured: dict[str, float], root: Path = ROOT) -> dict[str, float]:
+    """All durations after a run of some files: `measured` over those of before, without files that are gone, sorted."""
+    return {name: seconds for name, seconds in sorted((durations | measured).items()) if (root / name).is_file()}
+
+
 def pytest_addoption(parser):
-    parser.addoption("--write-durations", action="store_true", help="write tests/durations.toml after the run")
+    parser.addoption(
+        "--write-durations", action="store_true", help="measure the files of this run for tests/durations.toml"
+    )
     parser.addoption("--update-golden", action="store_true", help="write tests/golden/*.txt instead of comparing")
 
 
@@ -110,6 +117,7 @@ class _Stopwatch:
 
     def pytest_sessionfinish(self):
         if self.wanted:
-            lines = [f'"{name}" = {seconds:.1f}\n' for name, seconds in sorted(self.seconds.items())]
+            known = merged(tomllib.loads(DURATIONS.read_text(encoding="utf-8")), dict(self.seconds))
+            lines = [f'"{name}" = {seconds:.1f}\n' for name, seconds in known.items()]
             head = "# Seconds that each file of tests takes, set-up included: `make tiers` measures them.\n"
             DURATIONS.write_text(head + "".join(lines), encoding="utf-8")

@@ -3,11 +3,11 @@
 - ``pysindy``: sparse regression (STLSQ) of the residual acceleration on a library of terms;
 - ``gaussian process``: scikit-learn's, with a length scale for every state.
 
-Both get what diagnose got: the fitted base model, the same trials to learn from, the same held-out trials. Both say
-that something is missing where, over the trials left out in turn, what they learnt predicts the residuals better than
-zero does (Wilcoxon's signed ranks over quarters of trials, at 5 %). Then the discrepancy is added to the base model,
-which is run again on the held-out trials (`residuals`). Neither knows names; `points_to` holds the effects whose
-force would look like the term of the sparse law that moves most.
+Both get what diagnose got: the fitted base model, the same trials to learn from, the same held-out trials. Trials are
+left out in turn. Both say that something is missing where what they learnt predicts their residuals better than zero
+does (Wilcoxon's signed ranks over quarters of trials, at 5 %). Then the discrepancy is added to the base model, which
+is run again on the held-out trials (`residuals`). Neither knows names; `points_to` holds the effects whose force would
+look like the term of the sparse law that moves most.
 
 They need ``pip install .[bench]``; `missing` says so where they are not there.
 """

@@ -4,10 +4,10 @@ A force is learnt from the residual force beside the measured state, row by row 
 model, which is run again on held-out trials: `held_out_gap` is the gap that is left.
 
 Both kinds of trials: the base model is the one that diagnose fitted, and the residual is what it leaves. Of a tumble
-it is measured less modelled specific force and angular acceleration, at the IMU's rows, times the inertia that resists;
-the state is the measured one, smoothed by Savitzky-Golay polynomials of order 3 (camera 0.1 s, gyro and wheel 0.05 s),
-since a force belongs to where the platform was, not to where the model thought it was. Of a penetration it is measured
-force (of a drop, m (g - a)) less the base model's at the smoothed depth, beside depth, speed and the way back from the
+it is measured less modelled specific force and angular acceleration, at the IMU's rows, times the inertia that resists.
+The state is the measured one, smoothed by Savitzky-Golay polynomials of order 3 (camera 0.1 s, gyro and wheel 0.05 s):
+a force belongs to where the platform was, not to where the model placed it. Of a penetration it is measured force (of a
+drop, m (g - a)) less the base model's at the smoothed depth. Beside it stand depth, speed and the way back from the
 deepest point.
 """
 

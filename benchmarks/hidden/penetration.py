@@ -92,7 +92,7 @@ def make_hidden(
 ) -> tuple[Campaign, Hidden]:
     """A campaign and what is hidden in it.
 
-    `kind`: None draws one: a null (one in four), an effect, a pair, or what no library has (one in six); else
+    `kind`: None draws one: a null (one in four), an effect, a pair, or what no library has (one in six). Else it is
     ``null``, an effect's id, ``pair`` or one of `OUTSIDE`. `strength`: the signature aimed at, over the noise.
     `trials`: how many; None draws 6 to 24.
     """

@@ -192,9 +192,9 @@ def make_rig(
     `kind`: None draws one; else ``null``, an effect's id, ``pair`` or one of `OUTSIDE`. `strength`: the signature aimed
     at, over the noise. `trials`: how many; None draws 6 to 21. `law`: the kind of the effect's law (`LAWS`).
 
-    The signature is the root mean square of what the effect changes over the noise, weighed with all that K, C and the
+    The signature is the root mean square of what the effect changes over the noise. It leaves out what K, C and the
     nuisances that are there may explain within their standard deviations. `Hidden.extra["left"]` has for each trial the
-    chi-square, with the stated noise, that the motion and forces themselves leave of what was recorded, and of how many
+    chi-square, with the stated noise, that motion and forces themselves leave of the recording, and the number of
     readings: zeros, jitter and noise louder than stated are in it, and no law can leave less.
     """
     random = np.random.default_rng((seed, 20))

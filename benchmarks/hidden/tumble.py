@@ -1,8 +1,8 @@
 """Made-up campaigns of tumbles with something hidden in them, for `hedgebed bench diagnose`.
 
-Nothing here is shared with the code that diagnoses: the motions come from `hidden_tumble_motion`, the sensors are read
-off them here, and every effect has another functional form than the library's where it can have one. What is hidden
-comes back beside the campaign, not in it: `hidden_suite.write_suite` puts campaigns and answers into two folders.
+Nothing here is shared with the code that diagnoses. The motions come from `hidden_tumble_motion`, the sensors are read
+off them here. Every effect has another functional form than the library's where it can have one. What is hidden comes
+back beside the campaign, not in it: `hidden_suite.write_suite` puts campaigns and answers into two folders.
 """
 
 import math

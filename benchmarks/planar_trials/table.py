@@ -1,8 +1,8 @@
 """Tables and figures of docs/planar.md and its notebook: `python -m benchmarks.planar_trials.table docs`.
 
-Both integrators and the batch on the paper's cases (two gravities, three torques, steel and brick), how the error at
-the end of a tumble falls with the step, and the list of effects. Writes between the marks of docs/planar.md and
-docs/notes/planar.md, and docs/images/planar-*.png.
+One table has both integrators and the batch on the paper's cases (two gravities, three torques, steel and brick).
+Others have the error at the end of a tumble over the step, and the list of effects. Writes between the marks of
+docs/planar.md and docs/notes/planar.md, and docs/images/planar-*.png.
 """
 
 import math

@@ -2,7 +2,7 @@
 
 yade -jTHREADS -x -n bench_yade.py BED OUT SKIN WARM STEPS. It runs in YADE's own Python, so it imports nothing of ours.
 BED: a file of LIGGGHTS and LAMMPS: id, type, diameter, density, x, y, z. SKIN: of the broad phase [m]. OUT gets one
-line of JSON. The floor is of facets, each smaller than the period, as YADE has no plane in a periodic cell; the cell is
+line of JSON. The floor is of facets, each smaller than the period, as YADE has no plane in a periodic cell. The cell is
 so high that nothing meets its image above.
 """
 

@@ -1,13 +1,13 @@
 """Where the time of a step goes: in our bed, and in the loop in plain C beside it.
 
-Our steps are one kernel, so nothing in it is timed. The same state is stepped with a time step of nothing, in which
-grains stay where they are, and what a phase takes is found by leaving it out:
+Our steps are one kernel, so nothing in it is timed. The same state is stepped with a time step of 0, in which grains
+stay where they are. The time of a phase is found by leaving it out:
 
 * **all**: a step of the race, lists and all;
 * **moving**: a step of the bed that stands still, with lists made for grains so small that they have no row. It holds
   bodies, launches, and the threads' waiting between two phases;
-* **contacts found**: a step with the race's lists and grains that have shrunk by a tenth, so that every row is looked
-  at and nothing touches, less that;
+* **contacts found**: a step with the race's lists and grains smaller by a tenth, so that every row is read and nothing
+  touches, less that;
 * **contact forces**: a step of the bed as it is, less both;
 * **sorting, making lists**: their kernels, times the lists that a step needed;
 * **else** (inferred): what is left of a step: contacts that come and go, Python, threads that wait longer.

@@ -1,9 +1,9 @@
 """A spike pushed into the race's bed, by us and by LAMMPS: the force on it, mean over equal parts of the way.
 
-The spike is a cylinder with a flat end, of the grains' material; it starts above the surface of a bed that has settled
+The spike is a cylinder with a flat end, of the grains' material. It starts above the surface of a bed that has settled
 for as many steps in both. LAMMPS has it as a moving region, and samples its force now and then; ours is the mean over
 all steps. LIGGGHTS could have it as a mesh only, and the LIGGGHTS of Debian 12 ends with a segmentation fault at any
-mesh; YADE is ten times slower in the race.
+mesh. YADE is ten times slower in the race.
 """
 
 import os

@@ -2,7 +2,7 @@
 
 The race's bed after its warm-up is laid end to end (``Bed.repeated``), so that every size has the same grains in the
 same state. Each size runs in a process of its own, which also says what memory it holds and held at most. Bytes a grain
-are the growth from the smallest size to this one over the growth in grains, so that Python and Taichi are left out.
+are the growth from the smallest size to this one over the growth in grains. So they leave out Python and Taichi.
 
 python -m benchmarks.race.scale BED.npz TIMES THREADS STEPS    # one size: a line of JSON
 """

@@ -1,7 +1,7 @@
 """What can be hidden in tumbles of the second simulator: each effect as numbers of `motion.COLUMNS` at an amplitude.
 
-An effect of size 1 stands at the top of what a rig could show; the suite goes down from there until its signature is
-the one that is asked for. Effects with a name have one of two forms, drawn by the seed.
+An effect of size 1 is the largest that a rig could show. The suite goes down from there until its signature is the
+requested one. Effects with a name have one of two forms, drawn by the seed.
 """
 
 import math

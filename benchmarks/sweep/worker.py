@@ -1,8 +1,9 @@
 """One measurement of the sweep in a process of its own, which gives all its memory back; says what it found as JSON.
 
-python -m benchmarks.sweep.worker prepare GRAINS FILE ARCH       the bed of the race, into a file of numpy
+python -m benchmarks.sweep.worker prepare GRAINS FILE ARCH
+    Writes the bed of the race into a file of numpy.
 python -m benchmarks.sweep.worker measure FILE ARCH NX NY STEPS PRECISION ROLLING
-    that bed NX by NY times side by side, through WARM_STEPS steps that are not timed and STEPS that are
+    Places that bed NX by NY times side by side. WARM_STEPS steps are not timed, then STEPS are.
 """
 
 import json

@@ -21,8 +21,8 @@ class LammpsGround(BedGround):
     Only explicit coupling is possible, because a step cannot be taken back. LAMMPS reports the kinetic energy. The
     energies of height and of the normal springs, with DMT's cohesion, follow from the grains' places. The energy of
     friction's springs and the losses are not reported. With JKR neither are the normal springs: whether a stretched
-    contact holds depends on its history. Nor are they under a spike with a cone, which is a pyramid in LAMMPS
-    (`polyhedra.pyramid_corners`), not the cone whose distance to the grains is known; `pushes` are then refused.
+    contact holds depends on its history. Nor are they under a spike with a cone: it is a pyramid in LAMMPS
+    (`polyhedra.pyramid_corners`), not the cone whose distance to the grains is known. There `pushes` are refused.
     """
 
     bed: LammpsBed

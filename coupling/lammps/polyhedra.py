@@ -5,10 +5,10 @@ point of one plane lies within all others. So edges and corners exert no force. 
 velocity. So each face is a plane (`Facet`), each edge a prism as thin as `THIN` (`Sheet`), which has the edge and both
 corners. A face that is a parallelogram is one such prism together with its edges and corners.
 
-Each grain touches one piece: that with the face, edge or corner nearest to its centre. Planes bound these cells: for a
-face, planes through its edges along its normal; for an edge, the same planes of its two faces, and planes through its
-ends across it; for a corner, those of its edges. The cells fill the space outside exactly, since both sides of a plane
-have the same numbers. So distance, normal and radius of curvature (R* is the grain's
+Each grain touches one piece: that with the face, edge or corner nearest to its centre. Planes bound these cells. For a
+face, they go through its edges along its normal. For an edge, they are the same planes of its two faces, and planes
+through its ends across it. For a corner, they are those of its edges. The cells fill the space outside exactly, since
+both sides of a plane have the same numbers. So distance, normal and radius of curvature (R* is the grain's
 radius) are those of `dem.Polyhedron`. A grain that passes from one piece to another begins a new contact there.
 """
 

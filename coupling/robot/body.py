@@ -12,8 +12,8 @@ h / 2 before its positions. Those of the feet that are given here belong to s / 
 lag), w = v + h / 2 a + s / 2 M^-1 J^T F, a all accelerations. The given start velocity counts as w.
 
 Under a Coulomb bound the sticking points of a foot share the holding force in proportion to their loads. So their mean
-slip and their turning about the vertical are zero at the step's end, as in `coupling.spatial_body`; here for all feet
-at once, by J M^-1 J^T.
+slip and their turning about the vertical are zero at the step's end, as in `coupling.spatial_body`. Here this holds for
+all feet at once, by J M^-1 J^T.
 """
 
 import copy

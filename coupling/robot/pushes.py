@@ -1,10 +1,9 @@
 """The push of a surface law on one foot, written as a Python function of its own: `write_push`.
 
-The arms of the points, their depths and their velocities are linear in where the points are on the foot, so that one
-product serves all points with the same coordinate, and two points opposite each other. Of the forces of the points
-only sums, and sums times coordinates, go into the wrench. So a point costs its depth, rate and slip and its law. All
-numbers of foot and law stand in the source: an interpreter spends most of its time on reading numbers and calling
-functions.
+The arms of the points, their depths and their velocities are linear in where the points are on the foot. So one product
+serves all points with the same coordinate, and two points opposite each other. Of the forces of the points only sums,
+and sums times coordinates, go into the wrench. So a point costs its depth, rate and slip and its law. All numbers of
+foot and law stand in the source: an interpreter spends most of its time on reading numbers and calling functions.
 """
 
 import math
@@ -56,10 +55,11 @@ def write_push(
 ) -> Callable[..., int]:
     """The function that adds the force of a law on `foot` to ``data.qfrc_passive``, and returns points evaluated.
 
-    Its arguments are: an MjData, and its rows of the foot in ``xipos``, ``xmat`` and ``cvel``, its row of the robot in
-    ``subtree_com``, its ``qfrc_passive``, deepest depth of each point of all feet before and now [m] (lists; without
-    `memory` they are not used). ``laws``: of each part. ``names``: what the function uses: the model as `model`, the
-    functions `apply` (``mj_applyFT``), `warn` and `warn_fast`, and the arrays `force` and `torque`.
+    Its arguments begin with an MjData and the rows of the foot in its ``xipos``, ``xmat`` and ``cvel``. Then come the
+    row of the robot in its ``subtree_com``, and its ``qfrc_passive``. Two lists follow: the deepest depth of each point
+    of all feet before and now [m]; without `memory` they are not used. ``laws``: of each part. ``names``: what the
+    function uses: the model as `model`, the functions `apply` (``mj_applyFT``), `warn` and `warn_fast`, and the arrays
+    `force` and `torque`.
     """
     lines = [
         "across, along, height = place.tolist()",

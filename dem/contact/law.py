@@ -20,7 +20,7 @@ tangential spring at the rolling radius):
     A grain at rest is held by the spring alone, so it does not creep.
 Twisting, where there is rolling resistance: the same form about the normal, with Marshall's 2009 stiffness S_t a^2 / 2
 (J. Comput. Phys. 228:1541) and the torque of a fully sliding Hertzian contact as bound, 3 pi / 16 mu a F_n (Johnson
-1985, section 7.4), which stops a grain from spinning on one contact for ever.
+1985, section 7.4). This bound stops a grain from spinning on one contact for ever.
 Cohesion (``dem.contact.cohesion``): DMT takes 2 pi w R* off the normal force, JKR has a force and a contact radius of
 its own. Damping never makes a pair pull more than its pull-off force; without cohesion that is the cut at zero. In the
 bounds of friction, rolling and twisting the load that presses the surfaces together stands for F_n: F_n + 2 pi w R*
@@ -40,12 +40,12 @@ projected onto the plane of n, and does not turn about n.
 
 In time. Velocities live half a step behind positions.
 - The normal dashpot wants d' at the time of the force. A contact remembers ``past`` = (m* v + dt F) / 2 of the step
-  before; with a = (v - v_before) / dt the last relative acceleration, whoever caused it, and the change of the pair's
-  own force F, v + dt a / 2 + dt (F - F_before) / 2 m* = 3/2 v + (dt F / 2 - past) / m*. F then stands on both sides,
-  linearly. Of a pair alone this is the velocity after half a kick by F itself; at rest it is zero.
+  before. Let a = (v - v_before) / dt be the last relative acceleration, whoever caused it, and F the pair's own force.
+  Then v + dt a / 2 + dt (F - F_before) / 2 m* = 3/2 v + (dt F / 2 - past) / m*. F then stands on both sides, linearly.
+  Of a pair alone this is the velocity after half a kick by F itself; at rest it is zero.
 - The force of the step in which a pair came to touch stands for the time from the touch to half a step later. Hertz's
-  dashpot starts as d^(1/4), so its mean over that time is 4/5 (f + 1/2)^(5/4) / f^(1/4) of what it is at the step's
-  end, f the share of the step for which the pair has touched.
+  dashpot starts as d^(1/4), so its mean over that time is 4/5 (f + 1/2)^(5/4) / f^(1/4) of its value at the step's end.
+  Here f is the share of the step for which the pair has touched.
 - The slip of a step is taken across the normal m at the step's middle, the time of the velocity, with the arms of that
   time. It is then laid into the plane of n. With m = n - h v_t, h = dt / 2 |x_i - x_j| and v_t what of v = v_i - v_j is
   across n, it is (1 + h v n) v_t - W x n - h (W n) v_t x n, W the spins times their arms, but for terms of second order
@@ -174,16 +174,16 @@ def contact_force(
 ):  # fmt: skip
     """Force on the first of a pair, without rolling.
 
-    ``p`` the pair's parameters, ``n`` the unit normal towards the first, ``v_n`` the rate at which the first moves away
-    and ``v_t`` the slip, across n, both half a step before [m/s]; ``overlap`` [m], ``radius``, ``mass`` the effective
-    ones, ``onset`` from ``onset_of``, ``dt`` the time since the last force; 0 where forces are computed anew, which
-    leaves the history alone. ``u`` the history, updated in place: tangential displacement [m] and ``past`` [kg m/s], 0
-    for a new contact.
-    For a ``rescaled`` spring: what the overlap has gained over the step, ``closed`` [m]; the middle of both normals,
-    ``middle``, whose part along n is 1; and how far the pair has turned about it, ``angle`` [rad].
-    Returns (normal force [N]; the dashpot's part of it [N]; tangential force vector [N]; tangential stiffness [N/m];
-    contact radius [m]; sqrt(m* S_n); load that presses the surfaces together [N]; contact radius of the step before
-    over that of now, at most 1).
+    ``p`` has the pair's parameters, ``n`` is the unit normal towards the first. ``v_n`` is the rate at which the first
+    moves away, ``v_t`` the slip across n, both half a step before [m/s]. ``overlap`` [m], ``radius`` and ``mass`` are
+    the effective ones, ``onset`` is from ``onset_of``. ``dt`` is the time since the last force; it is 0 where forces
+    are computed anew, which leaves the history alone. ``u`` is the history, updated in place: tangential displacement
+    [m] and ``past`` [kg m/s], 0 for a new contact.
+    A ``rescaled`` spring needs three more. ``closed`` is what the overlap has gained over the step [m]. ``middle`` is
+    the middle of both normals, whose part along n is 1. ``angle`` is how far the pair has turned about it [rad].
+    Returns first (normal force [N]; the dashpot's part of it [N]; tangential force vector [N]; tangential stiffness
+    [N/m]; contact radius [m]). Then follow sqrt(m* S_n), the load that presses the surfaces together [N] and the
+    contact radius of the step before over that of now, at most 1.
     """
     # Single precision on a GPU has a root that is no better than its last digit, and an overlap that may be below 0.
     a = ti.sqrt(radius * ti.max(overlap, 0.0))

@@ -7,7 +7,7 @@ the step of ``dem.contact.law`` linearised. With x the change of a contact's ove
 f its force, in units of m*, S_n and w = sqrt(S_n / m*); q = w dt, c the damping factor, N = z / 3:
     v' = v + q N f,  x' = x + q v',  (1 + q c / 2) f' = -x' - c (3/2 v' - v / 2 - q f / 2).
 An eigenvalue comes to -1 where N q^2 + 4 (N - 1) c q = 4. Alone (N = 1) a pair is stable up to q = 2 with any damping,
-as its own force is solved for; what the neighbours do is seen half a step late, which gives the term 4 (N - 1) c q.
+as its own force is solved for. What the neighbours do is seen half a step late, which gives the term 4 (N - 1) c q.
 Where contacts stick, spins of one sense are stiffer: each contact slips at twice r times the spin, against S_t = K S_n
 and a dashpot that sees the half-step velocity. There 5/3 z (K q^2 + 2 c sqrt(K) q) = 4, K = 2 (1 - nu) / (2 - nu).
 """
@@ -36,8 +36,8 @@ CHAIN = 4.0
 def contact_time(material: Material, *, diameter: float, max_overlap: float) -> float:
     """Half a period of the stiffest contact that the overlap bound allows [s].
 
-    pi sqrt(m* / S_n), S_n = 2 E* a with a = sqrt(R* delta) (or JKR's) at delta = max_overlap d, for two grains and for
-    a grain on a rigid plane, whichever is shorter. A Hertzian collision that reaches this overlap lasts 1.28 times as
+    It is pi sqrt(m* / S_n), S_n = 2 E* a with a = sqrt(R* delta) (or JKR's) at delta = max_overlap d. Of two grains and
+    a grain on a rigid plane the shorter time counts. A Hertzian collision that reaches this overlap lasts 1.28 times as
     long, and one that reaches a tenth of it 2.3 times.
 
     ``diameter``: of the smallest grain [m]; ``max_overlap``: overlap over diameter [1].
@@ -111,9 +111,9 @@ def choose_young(
 ) -> float:
     """The softest Young's modulus that keeps overlaps within the bound [Pa]; never above the material's own.
 
-    Two needs, the larger of which rules: a bed under pressure, whose mean contact force is about p d^2 and its largest
-    ``CHAIN`` times that (F = 2/3 E* d^2 (delta/d)^1.5), and a collision of two grains
-    ((delta/d)^2.5 = 15 pi / 96 rho v^2 / E*).
+    It meets the larger of two needs. One is a bed under pressure, whose mean contact force is about p d^2 and its
+    largest ``CHAIN`` times that (F = 2/3 E* d^2 (delta/d)^1.5). The other is a collision of two grains ((delta/d)^2.5 =
+    15 pi / 96 rho v^2 / E*).
 
     Args:
         pressure: the largest on the grains [Pa]. speed: of the fastest collision [m/s].

@@ -27,11 +27,12 @@ class BedBodies(BedBase):
 
         Args:
             shape: one or several of dem's Ball, Cylinder, Cone, Capsule, Box, Tube, Polyhedron, Mesh, Plane and Placed,
-                in the body's frame; their union is the body, and touches a grain once. What lies farther sideways from
+                in the body's frame. Their union is the body, and touches a grain once. What lies farther sideways from
                 the body's origin than half the bed's period touches nothing.
             position: of the body's origin [m].
             facing: as ``dem.Facing`` has it: friction, restitution, rolling_friction of a grain on the body, young [Pa]
-                and poisson of the body, surface_energy of the two [J/m2]; the grains' own, and rigid, if not given.
+                and poisson of the body, surface_energy of the two [J/m2]. What is not given is the grains' own; without
+                young the body is rigid.
 
         Raises ValueError: no shape, a number that no pair can have, too many bodies, a grain already in contact by more
         than the overlap bound.

@@ -1,9 +1,9 @@
 """The lists of a bed against brute force: what ``BedBase.debug`` does at every step and whenever lists are made.
 
 Every pair of grains within reach is found anew on the host, by a tree over all grains in the periodic box. Every
-distance to a body is found by trying all grains with all bodies. Three faults are mistakes of the program: a list with
-a pair too few, too many, twice or through a wrong image; a list that is out of date; a contact whose history was lost.
-Then BedFailure says which grains, at which step. Of two sleepers nothing is listed, and nothing is looked for.
+distance to a body is found by trying all grains with all bodies. Three faults are mistakes of the program. A list has a
+pair too few, too many, twice or through a wrong image. A list is out of date. A contact has lost its history. Then
+BedFailure says which grains, at which step. Of two sleepers nothing is listed, and nothing is looked for.
 
 Costs many times what the step itself does: for tests, and for a bed that is not believed.
 """

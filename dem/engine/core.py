@@ -74,8 +74,8 @@ class BedCore(BedState):
             precision: "float64" or "float32". arch: "cpu" or "cuda". threads: of the CPU; all when None.
 
         Raises ValueError: arrays of wrong shape; numbers that are not finite; a negative size; a step too long; a bed
-        narrower than three grains; grains that overlap one another or the floor by more than ``max_overlap``; grains
-        outside the box.
+        narrower than three grains. Grains must be inside the box, and none may overlap another or the floor by more
+        than ``max_overlap``.
         """
         stuff = find_material(material)
         if young is not None:

@@ -10,10 +10,10 @@ Friction is kept contact by contact as well: take the work of a contact's part o
 spring gained. It is *lost* where it is positive and *made* where it is negative. A law without a fault makes nothing.
 
 Beside it stands the balance of angular momentum about the bed's origin: the part that the bodies took, and the part
-that reaches grains from outside. The latter has four sources: weight; contacts across the periodic sides (the torques
-on a pair whose neighbour is an image do not cancel but leave the period x F); grains put back into the box at its other
-side; and sleepers (the forces of others on them, and the loss of falling asleep). Leapfrog's x_n x m v_(n+1/2) changes
-by exactly the sum of these each step.
+that reaches grains from outside. The latter has four sources. Weight is the first. Contacts across the periodic sides
+are the second: the torques on a pair whose neighbour is an image do not cancel but leave the period x F. Grains put
+back into the box at its other side are the third. Sleepers are the fourth: the forces of others on them, and the loss
+of falling asleep. Leapfrog's x_n x m v_(n+1/2) changes by exactly the sum of these each step.
 
 A bed without a balance has ``ABSENT`` for a table, and its kernels are compiled without all this.
 """

@@ -4,12 +4,12 @@ Layout (measured reasons in docs/performance.md):
 
 * Grains lie in memory in the order of a space-filling curve through the cells, so that neighbours are near.
 * They are cut into a fixed number of contiguous chunks, whatever the number of threads. A pair inside a chunk is
-  computed once, by the chunk's own serial loop, and added to both; a pair across chunks is computed by both sides. So
+  computed once, by the chunk's own serial loop, and added to both. A pair across chunks is computed by both sides. So
   no two threads write to one grain, and every sum has one order: results are bitwise equal on any number of threads. On
   a GPU every grain has a thread and a full list of its own (``dem.gpu``).
 * A step has two phases. ``move`` kicks and drifts (leapfrog: velocities live half a step behind positions); ``push``
-  computes forces. Moving also finds out whether a grain has come further than half the skin; if so the launch ends
-  there, and the host makes new lists and goes on. On a CPU all steps of a launch are one parallel loop (``run``).
+  computes forces. Moving also finds out whether a grain has come further than half the skin. If so the launch ends
+  there, and the host makes new lists and continues. On a CPU all steps of a launch are one parallel loop (``run``).
 * Sums into a field are written as x = x + y, because Taichi's x += y is an atomic operation.
 
 An engine is compiled for a capacity, not for a number of grains, and is used again by the next bed that fits:

@@ -94,10 +94,11 @@ class Pairs(EnginePart):
     def pair_force(self, p, d, r_i, r_j, m_i, m_j, v, w_i, w_j, onset, dt, u: ti.template(), q: ti.template()):
         """Force of a pair on its first grain.
 
-        ``p`` the pair's parameters; ``d`` from the second to the first [m]; radii [m], masses [kg]; ``v`` the first's
-        velocity less the second's [m/s]; spins [rad/s]; ``onset`` from ``onset_of``; ``u`` and ``q`` the history,
-        updated in place. Returns (unit normal; normal force [N]; the dashpot's part of it [N]; tangential force [N];
-        rolling and twisting torque [N m]; arm of the first and of the second [m]; overlap over diameter).
+        ``p`` has the pair's parameters, ``d`` points from the second to the first [m]. Radii are in m, masses in kg.
+        ``v`` is the first's velocity less the second's [m/s], spins are in rad/s. ``onset`` is from ``onset_of``; ``u``
+        and ``q`` are the history, updated in place. Returns first (unit normal; normal force [N]; the dashpot's part of
+        it [N]; tangential force [N]). Then follow rolling and twisting torque [N m], arm of the first and of the second
+        [m] and overlap over diameter.
         """
         length = d.norm()
         sum_r = r_i + r_j

@@ -9,9 +9,9 @@ contacts with other sleepers keep their springs. All other grains are **fast**.
 The rules, in numbers of ``Sleep``; d is the mean diameter, m the mean mass, g gravity, all of the bed:
 
 * A fast grain becomes slow when four conditions hold. Its speed and its surface's turning have been below ``speed``
-  sqrt(g d) at every check for ``calm`` sqrt(d / g) (at the start of a bed ``settling`` times as long). No fast grain
-  that it touches moves faster. No body but the floor is within ``reach`` d. No other grain overlaps it by more than a
-  long step allows (``Sleeper.firm``).
+  sqrt(g d) at every check for ``calm`` sqrt(d / g). At the start of a bed this time is ``settling`` times as long. No
+  fast grain that it touches moves faster. No body but the floor is within ``reach`` d. No other grain overlaps it by
+  more than a long step allows (``Sleeper.firm``).
 * A slow grain becomes fast again when a body comes within ``reach`` d, or when another grain overlaps it by more than
   that. It also becomes fast when it moves faster than ``own`` sqrt(g d), or when the force on it is out of balance. The
   last means: more than ``unbalanced`` of the mean force of its contacts, or of m g where that is more. The slow grains

@@ -1,8 +1,8 @@
 """The state of a bed: as numpy arrays, in a file, in a bed of another layout; and checkpoint and rollback.
 
-A checkpoint is all that the next steps depend on, copied where it lies, on the device. ``Bed.state`` gives the same as
-arrays of the host, packed, for files; a step of a coupling that is repeated needs it often, and on a GPU without the
-bed leaving the device.
+A checkpoint is all that the next steps depend on, copied where it lies, on the device. ``Bed.state`` returns the same
+as arrays of the host, packed, for files. A coupling that repeats steps needs checkpoints often; on a GPU they stay on
+the device.
 """
 
 from collections.abc import Mapping

@@ -167,8 +167,8 @@ class Graded:
         """Grains of this solid volume in a loose column over the bed, none touching, each above its place.
 
         Heights are those at rest times ``_RESTED / _START``. Places come evenly from a low-discrepancy sequence (the
-        additive recurrence of Roberts 2018, alpha_k = phi^-k with phi^5 = phi + 1), kept with probability (fine / d)^3;
-        grains that overlap there are pushed apart.
+        additive recurrence of Roberts 2018, alpha_k = phi^-k with phi^5 = phi + 1). They are kept with probability
+        (fine / d)^3. Grains that overlap there are pushed apart.
 
         Returns centres [m], shape [grain_count, 3], and radii [m], shape [grain_count], in the order of a curve through
         space. Raises RuntimeError: the grains do not fit into the column; a bed that passes ``check`` never raises it.

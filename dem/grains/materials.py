@@ -183,8 +183,8 @@ PRESETS = Path(__file__).parents[1] / "presets"
 def read_material(path: str | Path) -> Material:
     """The material in a file of the form that this module's docstring gives.
 
-    Raises ValueError: a file that cannot be read or is not of this form; an unknown or a missing key; a value of the
-    wrong kind or that no material can have; the name of a material that ships with other numbers.
+    Raises ValueError: a file that cannot be read or has another form; an unknown or missing key; a value of the wrong
+    kind or out of range. The name of a material that ships is refused too, where the numbers differ.
     """
     stuff = _read(Path(path))
     known = MATERIALS.get(stuff.name)

@@ -1,7 +1,7 @@
 """Distributions of grain diameters: uniform, normal, log-normal, and a sieve table.
 
-Each has a mean, bounds and a mean cube, and draws diameters; all have bounds, because the smallest grain sets the
-time step and the largest the cells of the neighbour search. The normal and the log-normal count grains, as a microscope
+Each has a mean, bounds and a mean cube, and draws diameters. All have bounds, because the smallest grain sets the time
+step and the largest the cells of the neighbour search. The normal and the log-normal count grains, as a microscope
 does; a sieve table weighs them.
 """
 

@@ -2,7 +2,7 @@
 
 A strip is dug out of a bed at a fraction of its gravity; then gravity rises by steps until a face falls. A face of
 height h that stands at n g is the model of one of n h at g (centrifuge modelling: stresses are alike where rho g h is;
-Schofield 1980, Geotechnique 30:227), so one bed of some ten grains' depth finds critical heights from a tenth to four
+Schofield 1980, Geotechnique 30:227). So one bed of some ten grains' depth finds critical heights from a tenth to four
 times its own. Critical height and cohesion (Terzaghi 1943, a plane wedge without tension cracks):
     H_c = 4 c / gamma tan(45 + phi / 2),  gamma = rho_bulk g.
 """
@@ -43,13 +43,13 @@ class VerticalCut:
     """What became of a face.
 
     Attributes:
-        stood, fell: the largest gravity at which both faces stood and the least at which one fell, over the bed's own;
-            0 and None where it never stood or never fell.
+        stood, fell: the largest gravity at which both faces stood and the least at which one fell, over the bed's own.
+            0 where it never stood, None where it never fell.
         height: of the face [m]. unit_weight: bulk density times the bed's own gravity [N/m3].
         trials: gravity over the bed's own, and the share of the wedges' grains that had moved by a diameter, in order.
-        before, after: thickness against distance from the cut's middle [m]: ``before`` of the last standing faces (None
-            where none stood); ``after`` at rest at the bed's own gravity, when a face fell or stood to the end; (x,
-            thickness).
+        before, after: thickness against distance from the cut's middle [m]: ``before`` is of the last standing faces
+            (None where none stood). ``after`` is at rest at the bed's own gravity, when a face fell or stood to the
+            end. Each is (x, thickness).
         flanks: fitted slopes of what it slumped to; None where it stood or they are too short.
         width: of the cut [m]. bed: as it lies now.
     """

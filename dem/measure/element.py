@@ -1,7 +1,7 @@
 """A sample without weight between two rough walls, pressed and sheared: strength as a function of the grains alone.
 
-Gravity is off, so that every layer carries the same stresses and weight is not taken for cohesion (docs/bed.md); the
-sample is periodic sideways, floor and lid are planes on which grains neither slide nor roll, as in
+Gravity is off, so that every layer carries the same stresses and weight is not taken for cohesion (docs/bed.md). The
+sample is periodic sideways. Floor and lid are planes on which grains neither slide nor roll, as in
 ``dem.measure.shearing``. Nothing in it has a length but the grains: stresses scale with the pressure, and with cohesion
 the strength depends on surface energy over pressure times diameter.
 

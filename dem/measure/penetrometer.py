@@ -92,9 +92,9 @@ def push_cone(
         friction: of grains on cone and shaft; the grains' own when None.
         tell: called with the share done, 0 to 1.
 
-    Raises ValueError: a tilted bed; a cone thinner than three grains, or wider than a third of the bed; a depth at
-    which the cone is not all in, or too near the floor. BedFailure: the bed's own reasons, as an overlap past its
-    bound.
+    Raises ValueError: a tilted bed; a cone thinner than three grains, or wider than a third of the bed. The depth must
+    be so large that all of the cone is in, and not too near the floor. BedFailure: the bed's own reasons, as an overlap
+    past its bound.
     """
     grains = bed.grains()
     grain = 2 * float(grains.radius.mean())

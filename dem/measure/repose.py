@@ -1,9 +1,10 @@
 """Angle of repose: the bed is set on a plate with a slot, drains through it, and the slope that stays is measured.
 
 This is the drained angle of repose, of the material at rest above an outlet (Brown & Richards 1970, Principles of
-Powder Mechanics; set up as a bed over side outlets by Zhou et al. 2001, Phys. Rev. E 64:021301). The slot runs along y,
-where the bed is periodic: the slopes on its two sides have no side walls. Grains that fall through the slot lie in a
-pit below, so that no foot runs out. The plate is rough, so that the slope is that of the material and not of the plate.
+Powder Mechanics). Zhou and others (2001, Phys. Rev. E 64:021301) measured it in a bed over side outlets. The slot runs
+along y, where the bed is periodic: the slopes on its two sides have no side walls. Grains that fall through the slot
+lie in a pit below, so that no foot runs out. The plate is rough, so that the slope is that of the material and not of
+the plate.
 """
 
 import math

@@ -50,8 +50,8 @@ def prepare_as(
     Args:
         material, make: as for ``prepare_bed``.
         stages: as ``dem.prepare.recipe.parse_stage`` reads them: ``["rain", "fluff", "level", "compact:0.6"]``.
-        keep: a file (.npz; a .json comes beside it) where unfinished work is kept every minute and after every stage;
-            the next call with it continues from there, bitwise reproducibly.
+        keep: a file (.npz; a .json comes beside it) where unfinished work is kept every minute and after every stage.
+            The next call with it continues from there, bitwise reproducibly.
         cache: whether to look in the cache of ``prepare_bed``, and to leave the bed there, finished or not.
         progress: anything with ``stage(name, total)`` and ``update(done)``, or None; where it has ``show_bed(bed)``
             that is called before each ``update``. A KeyboardInterrupt out of ``update`` stops the preparation where it
@@ -94,8 +94,8 @@ def prepare_bed(
     when it is nearly at rest (mean kinetic energy of a grain below 1e-2 m g d). There are no reports.
 
     Args:
-        material: a name, the file of a material or a Material; its surface energy is taken for these grains, where it
-            states for which it holds (``Material.for_grain``).
+        material: a name, the file of a material or a Material. Where it states for which grains its surface energy
+            holds, that is converted to these grains (``Material.for_grain``).
         packing: bulk packing fraction [1]; the bed is tapped until it is reached, and where it is denser than that
             loosened from below first. As rained when None.
         make: the class of the bed; ``dem.Bed.prepare`` passes its own.
@@ -106,9 +106,9 @@ def prepare_bed(
     The grains fall as a loose column from rest. They come to rest in a drag, which replaces the long ringing of a soft
     bed. Then the grains above the level are removed, and the others settle again, at the end without drag. Settled
     means: mean kinetic energy of a grain below 1e-5 m g d, and floor force within 1 % of the weight. Raises ValueError:
-    an unknown material; a size or grain that is not positive; grains too large for the bed; a spread outside 0 to 0.5
-    or beside a distribution; a packing that cannot be reached; a time step too long. BedFailure: the bed did not come
-    to rest.
+    an unknown material; a size or grain that is not positive; grains too large for the bed; a time step too long. Also
+    for a spread outside 0 to 0.5 or beside a distribution, and for a packing that cannot be reached. BedFailure: the
+    bed did not come to rest.
     """
     wanted = Specification.of(material, **options)
     sizes, (x, y, z) = wanted.sizes, wanted.size

@@ -41,7 +41,7 @@ class StageReport:
         max_overlap: largest since the bed was made, over diameter [1].
         time: of the bed's clock at the end [s].
         profile: ``height`` of the layers' middles [m], ``packing`` [1], ``stress_zz``, ``stress_xx``, ``stress_yy``,
-            ``stress_xz`` [Pa], pressure positive; of a bed that was cut, in the middle of what was left.
+            ``stress_xz`` [Pa], pressure positive. Of a bed that was cut they are of the middle of what was left.
         notes: what the stage alone knows: taps, pressures, grains removed.
     """
 

@@ -3,7 +3,7 @@
 A body is a union of primitives in its own frame. A grain touches a body at most once: at the point of the union
 nearest to the grain's centre. Lengths in metres.
 
-Each primitive is stored as one row (kind, body, six numbers); ``nearest`` returns, for a point outside, the exact
+Each primitive is stored as one row (kind, body, six numbers). ``nearest`` returns, for a point outside, the exact
 distance to the union, the outward unit normal there, and the curvature 1/R of a ball's surface. The curvature of the
 others is 0: they meet a grain as a plane does. Further shapes are in ``dem.shapes.solids`` and ``dem.shapes.mesh``.
 """

@@ -47,7 +47,8 @@ class Mesh(Surface):
         triangles: Rows of three vertices, shape [triangle_count, 3], counter-clockwise seen from outside.
 
     Raises ValueError: no triangles; numbers that are not finite; a triangle without area or that names a vertex there
-    is not; an edge with other than two triangles; neighbours that disagree on the outside; a surface inside out.
+    is not. Each edge must have two triangles, neighbours must agree on the outside, and the surface must not be inside
+    out.
     """
 
     vertices: np.ndarray

@@ -4,7 +4,7 @@ Peak: the largest shear stress, smoothed over half a diameter of the lid's way. 
 of the way, with the standard error of five parts of it. Mohr-Coulomb: a straight line through the runs' stresses.
 
 Normal stress is the lid's. Shear stress is the same at every height. The normal stress grows downwards with the bed's
-own weight, so that the bed shears under the lid; what lies between imitates a cohesion, reported beside it.
+own weight, so the bed shears under the lid. The grains between imitate a cohesion, which is reported beside it.
 """
 
 import math

@@ -19,7 +19,7 @@ class Standing:
     """Depths of the origin of a body [m]."""
 
     depth: float  # Where the law carries the load
-    std: float | None  # Between beds; None where the table has one bed only
+    std: float | None  # Standard error over beds; None where the table has one bed only
     low: float  # End of the 95 % interval where the ground is stronger
     high: float | None  # The other end; None where the error of the law reaches the whole force
     law_error: float  # rms of the law's error over the force [1]

@@ -3,9 +3,9 @@
 1. A few points of the parameters' box are simulated (`calibrate.tests`), every test kept as it ends.
 2. A response surface with its uncertainty is fitted to each figure (`calibrate.fit`). The next point is where it
    informs the fit most, until enough is known or `most_points` are done.
-3. The parameters found, to three digits, are simulated anew with other seeds, and the surfaces learn from that; where a
-   figure is off by more than half its tolerance, they are found and checked once more. What the better check gives
-   stands beside what was wanted; figures that are compared only are measured then.
+3. The parameters found, to three digits, are simulated anew with other seeds, and the surfaces are fitted again with
+   these points. Where a figure is off by more than half its tolerance, they are found and checked once more. The better
+   check stands beside what was wanted; figures that are compared only are measured then.
 
 Why this and no optimiser of a library: docs/materials.md.
 """

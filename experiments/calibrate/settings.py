@@ -63,12 +63,12 @@ class Target:
         value, tolerance: in the figure's unit; the tolerance counts as a standard deviation.
         source: where it comes from.
         figure: which of ``FIGURES`` it is; its name if not given.
-        plane: of a friction angle: "shear", stresses on the shear plane as in a shear box or a ring shear tester;
-            "triaxial", the angle of triaxial compression; or "mohr", Mohr's circle of the largest and least stress. Of
-            a cohesion "shear" or "mohr", as a vertical cut has it.
+        plane: of a friction angle. "shear": stresses on the shear plane as in a shear box or a ring shear tester.
+            "triaxial": the angle of triaxial compression. "mohr": Mohr's circle of the largest and least stress. Of a
+            cohesion "shear" or "mohr", as a vertical cut has it.
         state: in which the sample is sheared: "loose" or "dense"; "drained" of an angle of repose; "cut" of a cut.
         fit: whether the parameters are fitted to it, or it is only compared at the end.
-        through: of a friction angle: "tests", a straight line through the tests of all pressures; or "origin", a line
+        through: of a friction angle. "tests": a straight line through the tests of all pressures. "origin": a line
             through the origin, as for laboratories that report an angle and no cohesion.
     """
 

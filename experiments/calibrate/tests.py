@@ -1,10 +1,10 @@
 """The tests behind a calibration: what a sheared sample, a drained or a cut bed says, and the bulk figures that follow.
 
-Stresses at large strain are means over the second half of the strain, their standard error that of five parts of it;
-the largest strength is that of the stress ratio averaged over a twentieth of strain.
+Stresses at large strain are means over the second half of the strain, their standard error that of five parts of it.
+The largest strength is that of the stress ratio averaged over a twentieth of strain.
 
 Friction angle and cohesion are those of a straight line through the tests' stresses, shear = cohesion + tan(angle)
-normal (Mohr-Coulomb), on the shear plane; of grains that do not stick one test gives the angle, as nothing but the
+normal (Mohr-Coulomb), on the shear plane. Of grains that do not stick one test gives the angle, as nothing but the
 pressure has the unit of a stress. The triaxial angle is that of triaxial compression at the same
 I1 I2 / I3 = (9 - sin^2) / (1 - sin^2) (Matsuoka & Nakai 1974, Proc. JSCE 232:59), from the whole stress tensor inside,
 cohesion c added to it as c / tan(angle). Those of Mohr's circle are of the straight line through the circles of the

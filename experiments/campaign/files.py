@@ -23,7 +23,7 @@ from pydantic_core import ErrorDetails
 
 from experiments.runs.folder import toml_value, write_text
 from experiments.runs.given import keep_given, kept_copy
-from rigid.checks import nearest
+from rigid.checks import alike, nearest, why_unread
 from rigid.digests import check_as_written
 
 from .digests import changed_files, write_digests
@@ -83,7 +83,9 @@ def read_campaign(folder: str | Path) -> Campaign:
     It also names each file that differs from its digest, where the folder has digests."""
     folder = Path(folder)
     if not folder.is_dir():
-        raise ValueError(f"{str(folder)!r} is no folder: one with campaign.toml was expected")
+        raise ValueError(
+            f"{str(folder)!r} is no folder: one with campaign.toml was expected{alike(folder, folders=True)}"
+        )
     path = folder / "campaign.toml"
     if not path.exists() and (within := folder / "campaign").joinpath("campaign.toml").exists():
         raise ValueError(f"{str(folder)!r} is a run folder: its campaign is {str(within)!r}")
@@ -232,10 +234,8 @@ def _read_toml(path: Path, kinds: Mapping[str, type[BaseModel]]) -> dict[str, An
     """The file as TOML has it, its kind being one of `kinds`."""
     try:
         table = tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except FileNotFoundError:
-        raise ValueError(f"{path}: there is no such file") from None
     except OSError as error:
-        raise ValueError(f"{path}: cannot be read ({error.strerror})") from None
+        raise ValueError(f"{path}: {why_unread(path, error)}") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ValueError(f"{path}: is not TOML: {error}") from None
     kind = table.get("kind")

@@ -69,9 +69,9 @@ class Recording:
 def read_recording(path: Path, wanted: Sequence[tuple[str, str]]) -> Recording:
     """Read the CSV file `path`, which must hold the quantities `wanted`: (name, unit), the time first.
 
-    Raises ValueError, one fault a line, naming file, line and column, what was found and what was expected: for a
-    missing file or column; a quantity given twice; text in a number; an infinite number; a row of another length; a
-    time that runs backwards or is missing in a row with numbers; and a file without rows.
+    Raises ValueError, one fault a line, naming file, line and column, what was found and what was expected. Faults of a
+    file: missing, without rows, a missing column, a quantity given twice. Faults of a row: text in a number, an
+    infinite number, another length, a time that runs backwards or is missing beside numbers.
     """
     header, rows = _read_cells(path)
     faults = _other_csv(path, header, rows) or _header_faults(path, header)

@@ -153,9 +153,9 @@ def said_once(found: Sequence[Finding]) -> list[Finding]:
 
 
 def loud_sensors(campaign: Campaign) -> list[Finding]:
-    """Sensors whose readings scatter from row to row by far more, or far less, than the noise that is stated: by fourth
-    differences, of which a smooth motion leaves little; the median of a trial, so that touches do not count; the median
-    over the trials. Grains that jam and yield make the force do the same."""
+    """Sensors whose readings scatter from row to row by far more, or far less, than the stated noise. The scatter is
+    that of fourth differences, of which a smooth motion leaves little. It is the median of a trial, so that touches do
+    not count, and the median over the trials. Grains that jam and yield make the force do the same."""
     found = []
     for (name, column), scatter in _scatters(campaign).items():
         ratio, stated = scatter.ratio, scatter.stated

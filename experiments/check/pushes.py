@@ -294,8 +294,8 @@ class _Push:
 
 
 def force_units(campaign: Campaign) -> Iterator[str]:
-    """Is force_N in newtons? A sentence where the force of all pushes is off by the factor between two units, over what
-    spring and damper give as stated; none else.
+    """Is force_N in newtons? It has a sentence where the force of all pushes is off by the factor between two units.
+    The force is compared with what spring and damper give as stated.
 
     Such a factor is the same in every push and at every depth, and far from what a stated uncertainty allows. Without a
     stiffness stated to better than its own size, that of drops is taken: m (g - accel) over the depth where they turn.

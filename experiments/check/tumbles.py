@@ -2,7 +2,7 @@
 
 How late one clock is against another shows in the camera's angle against the integral of the gyro's rate:
 theta(t) = c + b t + G(t - lag), G being the integral of the rate: c is the unknown start, b the gyro's zero. Nothing is
-known of a lag where the rate stays the same; where it changes, at a touch or while the torque acts, the lag stands out.
+known of a lag where the rate stays the same. Where it changes, at a touch or while the torque acts, the lag shows.
 """
 
 import math

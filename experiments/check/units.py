@@ -43,8 +43,8 @@ _MILLI = "mN (force_mN would say so)"
 
 
 def noise_unit(column: str, ratio: float) -> str | None:
-    """What a column may be instead, by its scatter from row to row over the stated noise, as a question; None where
-    that ratio is none of two units."""
+    """What a column may be instead, by its scatter from row to row over the stated noise, as a question. None where
+    that ratio is not the ratio of two units."""
     for factor, unit, advice in _BY_NOISE.get(column, ()):
         if ratio > 0 and abs(math.log(ratio / factor)) <= math.log(_LIKE):
             size = "small" if factor > 1 else "large"

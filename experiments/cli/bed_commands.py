@@ -174,6 +174,7 @@ def _foot(
     from experiments.bed.test_settings import SHAPES
     from rigid.digests import check_as_written
     from rigid.ground.rft_table import read_rft
+    from rigid.intervals import student
 
     with refusing():
         check_as_written(table)
@@ -203,13 +204,16 @@ def _foot(
         errors = {"law_error": size_of_law, "shape_errors": found.shape_errors, "speed": found.speed}
         print(json_module.dumps(numbers | errors | {"unit": "N", "warnings": warnings}, indent=2))
         return 0
+    half = std * student(len(found.left_out) - 1) if len(found.left_out) > 1 else std
     least = 1e-9 * float(np.linalg.norm(force))  # below it: round-off of forces that cancel
-    for axis, value, spread in zip("xyz", force, std, strict=True):
+    for axis, value, spread in zip("xyz", force, half, strict=True):
         if abs(value) <= least and (math.isnan(spread) or spread <= least):
             print(f"force {axis} = 0 N")
             continue
         print(f"force {axis} = {value:.4g}" + ("" if math.isnan(spread) else f" ± {spread:.2g}") + " N")
-    print(f"± is one standard deviation between beds; the law missed unseen plates by {100 * found.unseen:.0f} % (rms)")
+    print(
+        f"± is half of a 95 % interval over the beds; the law missed unseen plates by {100 * found.unseen:.0f} % (rms)"
+    )
     if found.shape_errors is not None:
         rms, worst = (100 * error for error in found.shape_errors)
         print(f"it missed other shapes by {rms:.0f} % (rms), by {worst:.0f} % at worst")

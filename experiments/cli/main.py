@@ -323,7 +323,8 @@ def _campaign_from_run() -> Callable[..., int]:
 
 def _effects(
     names: Annotated[
-        tuple[str, ...], Parameter(help="Effects to show in detail: parameters, source, limits.", negative="")
+        tuple[str, ...],
+        Parameter(help="Effects to show in detail: parameters, source, limits.", negative="", show_default=False),
     ] = (),
     /,
 ) -> int:

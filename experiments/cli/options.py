@@ -84,7 +84,7 @@ def option_of(name: str, field: FieldInfo) -> inspect.Parameter:
     if name in _RESERVED:
         raise TypeError(f"a setting cannot be called {name!r}: the command line has that already")
     default = None if field.is_required() else field.get_default(call_default_factory=True)
-    shown: bool | Callable[[Any], str] = False if default is None or default is PydanticUndefined else _shown
+    shown: bool | Callable[[Any], str] = False if default in (None, "", PydanticUndefined) else _shown
     is_flag = field.annotation in (bool, bool | None)
     more = field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
     hint = _bare(field.annotation, with_unit=find_unit(field.description) is not None)

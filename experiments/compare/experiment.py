@@ -24,7 +24,9 @@ from experiments.runs.result import Result, quantities_of
 from experiments.runs.types import Json
 from experiments.runs.whole_runs import computed_run
 from experiments.spatial.settings import ON_ANY_GROUND
+from rigid.intervals import NORMAL, half_width
 from rigid.planar.trajectory import LAUNCH_DISTANCE
+from vis.penetrate.errors import in_95
 
 from . import robots as compare_robots
 from . import spatial as compare_spatial
@@ -184,7 +186,7 @@ def _compared(results: list[Json], parts: list[dict[str, float | None]] | None =
     runs' own, which are kept as `first_whole` and `second_whole`.
     """
     first, second = (result.get("quantities", {}) for result in results)
-    rows = []
+    halves, rows = [_halves(result) for result in results], []
     for name in dict.fromkeys([*first, *second]):
         one, other = first.get(name, {}), second.get(name, {})
         whole = [entry.get("value") for entry in (one, other)]
@@ -196,12 +198,22 @@ def _compared(results: list[Json], parts: list[dict[str, float | None]] | None =
             "name": name, "unit": one.get("unit", other.get("unit", "")), "first": values[0], "second": values[1],
             "difference": values[1] - values[0] if both else None,
             "relative": _relative(*values) if both else None, "first_std": spreads[0], "second_std": spreads[1],
+            "first_half": halves[0].get(name), "second_half": halves[1].get(name),
         }  # fmt: skip
         if parts is not None:
             over = "shared time" if shared or name in TIMELESS else "whole runs"
             row |= {"over": over, "first_whole": whole[0], "second_whole": whole[1]}
         rows.append(row)
     return rows
+
+
+def _halves(result: Json) -> dict[str, float | None]:
+    """Half of the 95 % interval of each quantity whose error is known: over beds, or by the parameters of a law."""
+    if result.get("experiment") == "penetrate":
+        return {name: entry.get("std") for name, entry in in_95(result).items()}
+    beds = len(result.get("beds", ()))
+    stds = {name: entry.get("std") for name, entry in result.get("quantities", {}).items()}
+    return {name: half_width(std, beds) if beds else NORMAL * std for name, std in stds.items() if std is not None}
 
 
 def _differs(first: RunFolder, second: RunFolder, results: list[Json]) -> list[Json]:

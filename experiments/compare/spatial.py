@@ -1,6 +1,6 @@
 """Two tumbles in space on one grid of time: place, attitude, states, forces on the spikes, and how far they went apart.
 
-An attitude is a quaternion; two are as far apart as the angle of the one turn that leads from one to the other, at most
+An attitude is a quaternion. Two are as far apart as the angle of the one turn that leads from one to the other, at most
 pi. `turn` is that angle from each run's own start.
 """
 

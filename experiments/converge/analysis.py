@@ -3,10 +3,10 @@
 value      at the real grain, by the line in d / D (`statistics`)
 chance     of its interval over beds
 grain      what that line may be wrong by
-rest       width, depth, overlap, speed: each the end farther from 0 of the interval of the paired difference between
-           the base and the widest, the deepest, the stiffest and the slowest; together the root of their squares.
-           A share of the base's mean, taken of the value, but for C, which may be 0. What was not measured is not in
-           it, and named.
+rest width, depth, overlap, speed: each by the paired difference between the base and the widest, the deepest, the
+           stiffest and the slowest. The end of its interval that is farther from 0 counts; together the root of their
+           squares. A share of the base's mean, taken of the value, but for C, which may be 0. What was not measured is
+           not in it, and named.
 """
 
 import math

@@ -6,8 +6,8 @@ ordinary `penetrate` run, whose beds all get the same drives and drops.
 All members but those of other overlaps have one modulus, so that grains of every size overlap alike. Grains of the
 mean diameter d are driven at `driven_grain` / d times the speeds of the case: the inertial number is then the same,
     I = v d / (D sqrt(phi g D)),
-the rate v / D of shear under a tip of diameter D, times d sqrt(rho / P) (GDR MiDi 2004), at the pressure of grains one
-tip deep, P = phi rho g D with phi = 0.6 (`experiments.grains.similarity`).
+It is the rate v / D of shear under a tip of diameter D, times d sqrt(rho / P) (GDR MiDi 2004). P = phi rho g D is the
+pressure of grains one tip deep, with phi = 0.6 (`experiments.grains.similarity`).
 """
 
 import math

@@ -3,9 +3,9 @@
 Chance. A mean over n beds lies within t s / sqrt(n) of the mean of infinitely many. Here t is Student's at 95 % and n -
 1 degrees of freedom. Two cases are compared bed by bed: the interval is that of the differences.
 
-Grain size. A straight line in x = d / D through the means over beds, of the weights n_i / x_i^2 (the scatter of beds
-goes about as d, and weights that were taken from the scatter of a few beds would make the intervals too narrow). At
-the real grain it is a = sum c_i m_i, of the variance sum c_i^2 s_i^2 / n_i with the degrees of freedom of Welch and
+Grain size. A straight line in x = d / D through the means over beds has the weights n_i / x_i^2, as the scatter of beds
+is about proportional to d. Weights from the scatter of a few beds would make the intervals too narrow. At the real
+grain it is a = sum c_i m_i, of the variance sum c_i^2 s_i^2 / n_i with the degrees of freedom of Welch and
 Satterthwaite: sizes are independent, for beds of other grains are other beds. A size with one bed has the scatter over
 x that the others have together. The error of the straight line itself follows from other lines:
     three sizes and more: the larger of what the line without the coarsest grains, and what one in x^2, moves a by;

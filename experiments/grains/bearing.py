@@ -5,9 +5,9 @@ flat plate (`softening.bearing_gradient`), times 0.41 and times `strength`. The 
 friction; 0.41 is fitted to `sand-weak` (38 of 92 N/m, docs/results/penetrate). q is what grains that stick add; it is
 known by measurement for the materials of recipes.toml, and for others `RESISTANCE` times their cohesion.
 
-The effect of another cohesion is Terzaghi's bearing capacity of a circular foot (1943, general shear),
-q = 1.3 c N_c, with N_c = (N_q - 1) cot phi and N_q = exp(pi tan phi) tan^2(45 + phi / 2) (Prandtl 1921, Reissner 1924),
-phi of the grains. It is a lower bound here: a cone in `jsc-1a-loose` met some eight times that (docs/notes/bed.md).
+The effect of another cohesion is Terzaghi's bearing capacity of a circular foot (1943, general shear), q = 1.3 c N_c.
+Here N_c = (N_q - 1) cot phi and N_q = exp(pi tan phi) tan^2(45 + phi / 2) (Prandtl 1921, Reissner 1924), phi of the
+grains. It is a lower bound here: a cone in `jsc-1a-loose` met some eight times that (docs/notes/bed.md).
 """
 
 import math

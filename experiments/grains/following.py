@@ -36,6 +36,9 @@ class Frames(Protocol):
     def write(self, run: Any) -> None:
         """Write one frame of the present state."""
 
+    def watch(self, run: Any) -> None:
+        """Called after every step: write the frame of a moment of its own, where this is one."""
+
 
 class Followed(ABC, Generic[Run]):
     """An experiment that steps a platform: its frames, files and result."""
@@ -84,6 +87,8 @@ class Followed(ABC, Generic[Run]):
             if isinstance(run.ground, BedGround):
                 show_bed(progress, run.ground.bed)
             progress.update(run.fraction)
+            if drawn:
+                drawn.watch(run)
             if said := self.notice(run):
                 progress.message(said)
             if run.placement_is_long and not late:

@@ -14,8 +14,8 @@ BASE_COPY = "base.toml"  # Its name in that of a calibration, whose material.tom
 def keep_material(name: str, folder: Path, *, copy: str = MATERIAL_COPY) -> str:
     """Where the run takes its material from: ``name`` of one that ships, or ``copy`` in ``folder``, made once.
 
-    Raises ValueError for an unknown name and for a faulty file, unless the copy exists; for a damaged copy, and for the
-    file of a run that is not as the run wrote it.
+    Raises ValueError for an unknown name and for a faulty file, unless the copy exists. Also for a damaged copy, and
+    for the file of a run that has changed since the run wrote it.
     """
     from dem.grains.materials import MATERIALS, material
     from hedgebed_renamed import material_of_today

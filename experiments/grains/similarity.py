@@ -6,8 +6,8 @@ quasi-static motion. The inertial number d (dv/dz) / sqrt(P / rho) (GDR MiDi 200
 time in which a grain of diameter d falls into a gap with the time of the shear: here dv/dz = v / D, and P = phi rho g D
 is the weight of the grains above a depth of D, so that I = Fr (d / D) / sqrt(phi).
 
-The force of inertia, lambda rho_b v^2 on a tip's area, against the static one at the depth D, xi_n D (3D-RFT, see
-`experiments.grains.softening`), is lambda Fr^2 / (xi_n / rho_b g): `inertia_share`.
+On a tip's area the force of inertia is lambda rho_b v^2, and the static force at the depth D is xi_n D (3D-RFT, see
+`experiments.grains.softening`). Their ratio is lambda Fr^2 / (xi_n / rho_b g): `inertia_share`.
 """
 
 import math

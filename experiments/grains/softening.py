@@ -6,20 +6,20 @@ enough, the run is refused.
 
 1. Pressure under the tip, from 3D-RFT (Agarwal et al. 2023, arXiv 2205.14920), a flat plate going straight down:
        p = 0.876 xi_n z + lambda rho_b v^2,   xi_n = rho_b g (894 mu^3 - 386 mu^2 + 89 mu), mu held to 0.3-0.9,
-   rho_b the bulk density, lambda = 1.1, plus the weight of the bed itself, rho_b g H, and at least load / area,
-   which in flight is what the torque presses with (`PUSHED`).
+   rho_b the bulk density, lambda = 1.1. The weight of the bed itself, rho_b g H, is added. The sum is at least load /
+   area, which in flight is what the torque presses with (`PUSHED`).
 2. Mean contact force from the stress of an assembly (Rothenburg), F = pi d^2 p / (Z phi), which is d^2 p within 5 % at
    Z = 5, phi = 0.6. The distribution of forces in a loaded bed is exponential above the mean. So the largest of n
-   loaded contacts is ln n times the mean. Soft grains share the load: `chain` is 1.4 times what was measured, 2.8 among
-   some 400 contacts at 3.9 % of a diameter (ln 400 = 6; docs/results/penetrate; 3.4 in another drive) and 5.2 among
-   some 1600 at 1.02 % (ln 1600 = 7.4; ten grains across the tip, at 0.2 m/s).
+   loaded contacts is ln n times the mean. Soft grains share the load: `chain` is 1.4 times what was measured. That is
+   2.8 among some 400 contacts at 3.9 % of a diameter (ln 400 = 6; docs/results/penetrate; 3.4 in another drive). It is
+   5.2 among some 1600 at 1.02 % (ln 1600 = 7.4; ten grains across the tip, at 0.2 m/s).
 3. Hertz between two grains, F = (2/3) E* d^2 (delta/d)^1.5, E* = E / (2 (1 - nu^2)), so
        delta/d = (1.5 chain p / E*)^(2/3).
 4. Apart from that, a grain of mass m that hits something rigid at speed v: delta = (5 m v^2 / 4 k)^(2/5),
-   k = (4/3) E* sqrt(R), E* = E / (1 - nu^2). It is the spike at its speed, within `max_overlap`; and the floor after
-   the fall in which the bed was rained in, v^2 = 2 g h, within `RAIN_OVERLAP` if that is more: the impact of a grain on
-   the floor before there is a bed leaves no trace in it. Counting it would make the grains of a fine run three times as
-   stiff.
+   k = (4/3) E* sqrt(R), E* = E / (1 - nu^2). It is the spike at its speed, within `max_overlap`. It is also the floor
+   after the fall in which the bed was rained in, v^2 = 2 g h, within `RAIN_OVERLAP` if that is more. The impact of a
+   grain on the floor before there is a bed leaves no trace in it. Counting it would make the grains of a fine run three
+   times as stiff.
 5. Cohesion presses a grain onto a plane with its pull-off force as well, at most 4 pi gamma R (DMT): as a pressure 2 pi
    gamma / d, which no chain of grains makes larger: it is added in 3 without `chain`.
 
@@ -162,8 +162,8 @@ def soften_material(
 
     Diameters are uniform around `grain` within 1 +- `spread`: where that is wide, the mean grain is held to less than
     `max_overlap`, so that the smallest keep it (`dem.prepare.prepare.bound_of_mean`). `depth` is the deepest the tip
-    goes, `speed` its fastest, `pressure` of the load alone, `fall` how deep a grain fell when the bed was made;
-    `fastest` is the key that set the speed, `strength` the bed's over that of 3D-RFT (`bearing.strength`) [1],
+    goes, `speed` its fastest, `pressure` that of the load alone. `fall` is how deep a grain fell when the bed was made,
+    `fastest` the key that set the speed. `strength` is the bed's over that of 3D-RFT (`bearing.strength`) [1],
     `resistance` what a tip meets for the cohesion of grains that stick [Pa]. Where `young` [Pa] is set, the result has
     that, with the pressure and the speed. Raises ValueError for an overlap that is no share of a diameter, and where
     the real grains are too soft.

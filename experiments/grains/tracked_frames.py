@@ -1,8 +1,9 @@
 """Frames of a platform for ParaView: the bed and its surface, the platform, contact forces, one file a moment.
 
-A frame has the meshes `spikes` and `hull`; `row_forces`, the force on each row or spike that touches, as points with a
-vector `force` [N]; on a bed the grains, `contact_forces` (of each grain on a spike, that of the normal spring), and
-`surface`, a height map on a grid of half a grain with `height` and `change` [m] since the first frame.
+A frame has the meshes `spikes` and `hull`. `row_forces` is the force on each row or spike that touches, as points with
+a vector `force` [N]. On a bed it has the grains and `contact_forces` (of each grain on a spike, that of the normal
+spring). `surface` is a height map on a grid of half a grain with `height` and `change` [m] since the first frame. One
+further frame is near the moment of the largest force, as far as a kind of run has it (`PlatformFrames.push`).
 """
 
 from abc import ABC, abstractmethod
@@ -26,7 +27,10 @@ from vis.pictures.tracks import height_map, lying
 
 from .settings import GrainsSettings
 
-__all__ = ["PlatformFrames", "member_mesh"]
+__all__ = ["HARDER", "PlatformFrames", "member_mesh"]
+
+HARDER = 1.05
+"""Over the largest force of all frames so far: from there on a moment gets the frame of its own [1]."""
 
 Array = NDArray[np.float64]
 Run = TypeVar("Run", bound=CoupledTumble | SpatialRun | RobotRun)
@@ -45,8 +49,12 @@ class PlatformFrames(ABC, Generic[Run]):
         keep_until = max(run.time, 0.0) - 0.5 * run.master.macro_step if resumed else None
         name = (frames_of(folder) if resumed else None) or self.name  # a run may have begun under an earlier name
         self.writer = FrameWriter(folder, name=name, resume=resumed, keep_until=keep_until)
+        self._hardest = self.least_push(run)
         if resumed and self.writer.times:
-            self._untouched = read_frames(folder, name)[0].maps.get("surface")
+            frames = read_frames(folder, name)
+            self._untouched = frames[0].maps.get("surface")
+            self._hardest = max(self._hardest, *(self.push(frame.values) for frame in frames))
+            self.watch(run)  # The moment of the checkpoint itself, whose frame was removed
 
     @abstractmethod
     def body_meshes(self, run: Run) -> dict[str, Mesh]:
@@ -60,8 +68,23 @@ class PlatformFrames(ABC, Generic[Run]):
     def row_forces(self, run: Run, origin: Array) -> tuple[Array, dict[str, Array]]:
         """Where rows or spikes touch [m], with `origin` of the bed, and `force` [N] and `row` there."""
 
-    def write(self, run: Run) -> None:
+    def push(self, values: Mapping[str, float]) -> float:
+        """The force of a frame by its `values` [N], whose largest has a frame of its own; 0 where none has."""
+        return 0.0
+
+    def least_push(self, run: Run) -> float:
+        """The force from which on a moment can have a frame of its own [N]."""
+        return 0.0
+
+    def watch(self, run: Run) -> None:
+        """Write a frame where the force is by `HARDER` larger than in all frames before."""
+        if self.push(self.values(run)) > HARDER * self._hardest:
+            self.write(run, own_moment=True)
+
+    def write(self, run: Run, *, own_moment: bool = False) -> None:
         """One frame of what there is now; without a bed it has no grains."""
+        values = self.values(run)
+        self._hardest = max(self._hardest, self.push(values))
         ground = run.ground
         origin = ground.origin if isinstance(ground, BedGround) else np.zeros(3)
         grains: Json = {"position": np.zeros((0, 3)), "radius": np.zeros(0)}
@@ -75,7 +98,7 @@ class PlatformFrames(ABC, Generic[Run]):
             clouds["contact_forces"] = (points + origin, {"force": pushes})
             maps["surface"] = self._surface(ground, seen)
         self.writer.write(
-            run.time, grains, self.placed(run, origin), values=self.values(run), clouds=clouds, maps=maps,
+            run.time, grains, self.placed(run, origin), values=values, clouds=clouds, maps=maps, own_moment=own_moment,
         )  # fmt: skip
 
     def placed(self, run: Run, origin: Array) -> Mapping[str, tuple[Array, NDArray[np.int64]]]:

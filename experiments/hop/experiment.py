@@ -1,8 +1,8 @@
 """`hedgebed hop`: the wheel speed for a hop over a distance, the launch, the flight, and the margin to escape.
 
-The launch is that of `rigid.hop`, on rigid ground. For a brake the torque is given and the wheel's speed
-is computed; for a motor the torque is computed, and its wheel has the speed at lift-off. The planar model computes the
-same hop from compliant ground (`experiments.hop.on_surface`); the result has both.
+The launch is that of `rigid.hop`, on rigid ground. For a brake the torque is given and the wheel's speed is computed.
+For a motor the torque is computed, and the wheel's speed is that at lift-off. The planar model computes the same hop
+from compliant ground (`experiments.hop.on_surface`); the result has both.
 """
 
 import math

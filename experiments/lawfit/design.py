@@ -7,7 +7,7 @@ that remains.
 Every bed gets the same drives, drops and a placement under the load. After each step the spring-damper is fitted. Its
 uncertainty is half of the 90 % interval of its force at half the depth and the fastest speed, over the force. If C does
 not differ significantly from 0 and causes most of the uncertainty, each bed gets one more drive at twice the fastest
-speed; otherwise another bed is added. Of several cells (`experiments.lawfit.cells`) each begins with two beds, and the
+speed. Otherwise another bed is added. Of several cells (`experiments.lawfit.cells`) each begins with two beds, and the
 next step is made in the cell with the largest uncertainty. Costs are estimates made in advance, so that the same
 settings lead to the same runs on every machine.
 """

@@ -5,8 +5,8 @@ With rho the bulk density, D the diameter of the tip, x = z / D and Fr = v / sqr
     F / (rho g D^3) = f(x, Fr, tip) .
 
 A law is a static part and a part of the rate. Static parts: k_s x ("linear") and k_s x^n_s ("power"), with k and n of
-each tip shape s, and k (A / D^2) x^n ("area"), with the area A in the plane of the surface and one k and n for all.
-Parts of the rate: c Fr ("damper"), b Fr^2 ("square"), b Fr^2 exp(-x / (T Fr)) ("early"), and the static part times a I
+each tip shape s. "area" is k (A / D^2) x^n, with the area A in the plane of the surface and one k and n for all. Parts
+of the rate: c Fr ("damper"), b Fr^2 ("square"), b Fr^2 exp(-x / (T Fr)) ("early"), and the static part times a I
 ("inertial", I the inertial number of `experiments.grains.similarity`). With "area", b Fr^2 is times A / D^2.
 
 "early" follows Roth, Han and Jaeger (arXiv 1910.10358): at a characteristic time after the impact the dependence on

@@ -7,8 +7,8 @@ on the acceleration. With m_a(z) = b z as the mass that moves along,
     F = k z + d(m_a v)/dt = k z + b v^2 + b z a.
 
 Aguilar and Goldman (arXiv 1512.05762) found that such an added mass matters where a foot is accelerated. Their mass is
-that of a cone of grains that stops growing; the linear one here is the only one for which the term b v^2 is Katsuragi
-and Durian's own. In drives at constant speed both laws are the same.
+that of a cone of grains that stops growing. Only for the linear one here the term b v^2 is Katsuragi and Durian's own.
+In drives at constant speed both laws are the same.
 """
 
 from collections.abc import Mapping

@@ -11,6 +11,7 @@ from experiments.grains.kept_material import MATERIAL_COPY
 from experiments.penetrate.settings import PenetrateSettings
 from experiments.runs.folder import RunFolder
 from experiments.runs.types import Json
+from rigid.checks import alike
 
 from .cells import Cell
 from .data import Data, Drag, Foundation, Placement, Unloading, binned, reached
@@ -49,8 +50,8 @@ def read_cells(settings: LawFitSettings) -> dict[str, Data]:
     """All runs of `settings`: name of each tip and gravity (`Cell.name`) -> the data of its fits.
 
     Raises ValueError, naming the folder and what was found: for no finished run of penetrate in a bed; for a kept
-    result without series; for runs of different grains; for a run that is there twice; and for a tip and gravity with
-    fewer than two beds, or with runs at one speed, from which C and K cannot be separated.
+    result without series; for runs of different grains or the same run twice. A tip and gravity with fewer than two
+    beds is refused too. So are runs at one speed, from which C and K cannot be separated.
     """
     sources = [_read(name, path) for given in settings.runs for name, path in _folders(given)]
     _refuse_mixed(sources)
@@ -123,7 +124,8 @@ def _folders(given: str) -> Iterator[tuple[str, Path]]:
     """The run folders that a setting names: the folder itself, or those within it, in the order of their names."""
     path = Path(given)
     if not path.is_dir():
-        raise ValueError(f"runs = {given!r} is no folder: the folder of a run of penetrate was expected")
+        near = alike(path, folders=True)
+        raise ValueError(f"runs = {given!r} is no folder: the folder of a run of penetrate was expected{near}")
     if (path / "run.toml").is_file():
         yield path.name or given, path
         return

@@ -1,9 +1,9 @@
 """What the text of Reid, Roveda, Nesnas and Pavone (i-SAIRAS 2014) states, in its own words, beside our numbers.
 
 A claim is a dict: the words (`quote`), what is compared, what is stated, ours, the difference, what it is judged by,
-and whether it is met (None where nothing can be compared, or nothing is to be judged). It appears twice: for the
-paper's torque, a step, and for one that rises (`risen`). The paper prints no table, so that a stated number is a round
-one; an angle is judged by the five degrees within which the paper calls model and measurement in agreement.
+and whether it is met. The last is None where nothing can be compared, or nothing is to be judged. It appears twice: for
+the paper's torque, a step, and for one that rises (`risen`). The paper prints no table, so a stated number is a round
+one. An angle is judged by the five degrees within which the paper calls model and measurement in agreement.
 """
 
 import math

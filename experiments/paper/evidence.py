@@ -1,8 +1,8 @@
 """The paper's text as measured data: what the model omits on hard ground, weighed against its rivals.
 
-Eight statements of the text are about the twelve experiments on steel and brick. Each has a probability, the model's
-angles being off by `ERROR` (one standard deviation, the paper's own measure of agreement) and one reading in twenty
-being wrong (`WRONG`), independently:
+Eight statements of the text are about the twelve experiments on steel and brick. Each has a probability. The model's
+angles are taken to be off by `ERROR` (one standard deviation, the paper's own measure of agreement). One reading in
+twenty is taken to be wrong (`WRONG`), independently:
 
 1. of the eight low-torque experiments more than half start within 5 degrees of 22.5, and at most one exceeds that: one
    of the sixteen on all four surfaces does, on hard ground as likely as on grains;

@@ -40,7 +40,7 @@ class SpringAngle:
     rig: float  # g_sim [9.80665 m/s2]
     torque: float  # [N m]
     angle: float  # Of the first 10 mm [degrees]
-    half: float  # One standard deviation [degrees]
+    std: float  # Standard deviation by those of K and C [degrees]
 
 
 def kept_angles() -> tuple[KeptAngle, ...]:

@@ -1,9 +1,9 @@
 """The spring-damper with added effects: penetration's model.toml, as `hedgebed diagnose` writes it, on any settings.
 
-Driven spikes follow the path that they are given; drops are integrated with their touches and turns located
-(`experiments.diagnose.push.law`); what is set down is stepped on the law as a ground. The numbers of an effect
-are those of the model's diameter: on another one forces on a section scale with its square, forces on a shaft with it,
-those of the spring with the K that the model gives.
+Driven spikes follow the path that they are given. Drops are integrated with their touches and turns located
+(`experiments.diagnose.push.law`). What is set down is stepped on the law as a ground. The numbers of an effect are
+those of the model's diameter. On another one forces on a section scale with its square, forces on a shaft with it,
+those of the spring with the model's K.
 
 With a bed, every run of it is made on the law as well. Without one see `experiments.penetrate.on_law`.
 """
@@ -148,9 +148,9 @@ class AmendedLaw:
 
     @cached_property
     def pair(self) -> tuple[float, float]:
-        """K [N/m] and C [N s/m] of this diameter. Of a model with several: those that were fitted to it; between and
-        beyond them a power law of the diameter, which is a straight line through the nearest two in logarithms. Of a
-        model with one diameter: its own."""
+        """K [N/m] and C [N s/m] of this diameter. A model with several diameters has those that were fitted to it.
+        Between and beyond them they follow a power law, a straight line through the nearest two in logarithms. A model
+        with one diameter has its own."""
         return self._pair_of(self.by_diameter, (self.model.surface.stiffness, self.model.surface.damping))
 
     @property

@@ -1,6 +1,6 @@
 """Where the spring-damper departs from the bed: by depth and by speed, in numbers and in words.
 
-All from the loading of driven runs, in bands of depth; runs of one speed on several beds are averaged, and their
+All is from the loading of driven runs, in bands of depth. Runs of one speed on several beds are averaged, and their
 standard deviation between beds is reported. This separates an error of the law from differences of beds.
 """
 
@@ -37,8 +37,8 @@ def departures(
 ) -> Json:
     """The entry "departures" of result.json: table, exponents, returned work and sentences.
 
-    `by_bed` are the driven runs, bed by bed; `beds` and `models` all runs by id, in the bed and on the spring-damper;
-    `sinkage` the resting depth (bed, model) [m], each with half of its 95 % interval (None: unknown).
+    `by_bed` are the driven runs, bed by bed. `beds` and `models` are all runs by id, in the bed and on the
+    spring-damper. `sinkage` is the resting depth (bed, model) [m], each with half of its 95 % interval (None: unknown).
     """
     driven = [run for runs in by_bed for run in runs]
     table, exponents, rate = departure_table(driven, fit), depth_exponent(driven), rate_change(by_bed, fit)

@@ -1,9 +1,9 @@
 """The main experiment: a spike driven into, dropped on and set down on beds of grains, beside the spring-damper.
 
 For each seed a bed is prepared (or taken from the cache), and every run starts from that same bed. A finished run is
-kept in the folder and never computed again; a run under way is kept every `checkpoint_interval`, the bed with its
-contacts included, so that a run that was stopped or killed continues bitwise. Then the spring-damper is fitted,
-the same runs are made on it, and the two are compared.
+kept in the folder and never computed again. A run under way is kept every `checkpoint_interval`, with the bed and its
+contacts. So a run that was stopped or killed continues bitwise. Then the spring-damper is fitted, the same runs are
+made on it, and the two are compared.
 """
 
 import re

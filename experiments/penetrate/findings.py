@@ -1,6 +1,6 @@
 """From finished runs to the result: fits, the same runs on the spring-damper, departures, and facts about the bed.
 
-Spread between seeds is that of the runs which every seed has (same kind, same speed), each seed fitted by itself; the
+Spread between seeds is that of the runs which every seed has (same kind, same speed), each seed fitted by itself. The
 value is fitted to all runs of all seeds. A quantity that no second seed has gets the std null, one that is exact 0.
 
 Grains stick out of the surface, depth 0, so that some of them carry a spike before it: neither the fit nor the law
@@ -75,8 +75,8 @@ def drop_note(settings: PenetrateSettings) -> str:
 class Findings:
     """All that is read off the finished runs of one experiment.
 
-    `units` and `beds` are the runs and their series in the bed; `fit` is the law fitted to all of them, `seed_fits`
-    those of the seeds, `models` (id -> series) the same runs on the law.
+    `units` and `beds` are the runs and their series in the bed. `fit` is the law fitted to all of them, `seed_fits`
+    those of the seeds. `models` (id -> series) are the same runs on the law.
     """
 
     def __init__(self, settings: PenetrateSettings, units: Sequence[Unit], beds: Runs, time_step: float) -> None:

@@ -125,8 +125,8 @@ def settings_of_gravity(given: Json, fields: Mapping[str, FieldInfo]) -> Json:
 
 
 def settings_of_model(given: Json) -> Json:
-    """`given` with the spike of its ``model`` where it gives none: tip, diameter, cone angle, mass, and the load m g of
-    the model's drops, where they all had one gravity and no mass is given; and without runs that nobody asked for.
+    """`given` with the spike of its ``model`` where it gives none: tip, diameter, cone angle and mass. The load is m g
+    of the model's drops, where they all had one gravity and no mass is given. Runs that nobody asked for are left out.
 
     A file that cannot be read, or is no model of penetration, is refused later.
     """

@@ -97,9 +97,10 @@ def _number(quantities: Mapping[str, Any], name: str) -> Number:
 def compare_with(other: Mapping[str, Any], result: Mapping[str, Any]) -> tuple[Json, list[str]]:
     """How far the numbers of `result` moved from those of `other`: the entry "reference", and sentences.
 
-    A number of the entry's "moved" has "before", "now", their standard deviations (jackknife over the common runs for
-    K, C and the law's sinkage; between seeds for sinkage_dem; null where unknown), "change" [1] and "unit". K and C are
-    left out where they would compare different runs: of a reference without moments that has runs not made here.
+    A number of the entry's "moved" has "before", "now", their standard deviations, "change" [1] and "unit". The
+    deviations are by jackknife over the common runs for K, C and the law's sinkage, between seeds for sinkage_dem; null
+    where unknown. K and C are left out where they would compare different runs: of a reference without moments that has
+    runs not made here.
     """
     there, here = _side(other), _side(result)
     common = sorted(there.conditions.keys() & here.conditions.keys())

@@ -1,7 +1,7 @@
 """Settings of the experiments: every option of the command line, every key of a case file, the same names.
 
-SI units. What is wrong in a single value or between two of them is refused here, before any work; what needs to look at
-the machine or the grains' material is refused by the experiment's `check`.
+SI units. What is wrong in a single value or between two of them is refused here, before any work. What depends on the
+machine or the grains' material is refused by the experiment's `check`.
 """
 
 import math

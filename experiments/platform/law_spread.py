@@ -3,7 +3,8 @@
 The law is that of a ground file, or the spring-damper of a surface. Each parameter with a standard deviation s is moved
 alone, by +s and by -s, within what its law allows. The answer q is taken to be linear between: its standard deviation
 is the root of the sum of (s dq/dp)^2. Neither file states a covariance, so that the parameters count as independent.
-The error of the law itself is not in it.
+The error of the law itself is not in it. result.json has that standard deviation. Readers see 1.96 of it, half of a
+95 % interval.
 """
 
 import math
@@ -13,6 +14,7 @@ from typing import Any
 
 from experiments.runs.types import Json
 from rigid.ground_file import GroundFile
+from rigid.intervals import NORMAL
 from vis.page.law_rows import cell_of
 from vis.page.numbers import foldable
 
@@ -144,7 +146,7 @@ def spread_of_surface(
 def spread_entries(
     quantities: Mapping[str, Json], names: Mapping[str, str], *, surface: str, law: str, parameters: Sequence[str]
 ) -> tuple[Json, str]:
-    """``law_spread`` of result.json, and a sentence on what the standard deviations of a law change.
+    """``law_spread`` of result.json, and a sentence with the halves of 95 % intervals that a law's parameters give.
 
     `names`: number -> what it is called. `law`: "" for K and C of a row, "file" for that of a ground file, or a name.
     `parameters`: which of it were moved.
@@ -157,7 +159,7 @@ def spread_entries(
     if not parameters:
         return entries, say("no_spread", of=of)
     told = [
-        f"{words} {foldable(cell_of(entry['value'], entry['std'], entry['unit']))}"
+        f"{words} {foldable(cell_of(entry['value'], NORMAL * entry['std'], entry['unit']))}"
         for name, words in names.items()
         if (entry := quantities.get(name)) is not None and entry["value"] is not None and entry["std"]
     ]

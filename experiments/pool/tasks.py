@@ -1,8 +1,8 @@
 """One run of a list as a task: found by its settings and code, carried out once, taken up where it was left.
 
-The run folder is named by a digest of the settings, of the files that they name, and of the code that computes. Who
-comes upon it while another process works in it waits for that one; what is done there is read, what was left is gone
-on with from its checkpoint.
+The run folder is named by a digest of the settings, of the files that they name, and of the code that computes. A
+process that finds it while another one works in it waits for that one. A finished run is read, an unfinished one
+continues from its checkpoint.
 """
 
 import hashlib

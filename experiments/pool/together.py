@@ -146,7 +146,8 @@ def run_all(
         threads: of each run whose settings leave it open; the cores here shared out, or 1 on a cluster, if None.
 
     A run that fails is an outcome with a fault, and the others are made. Raises KeyboardInterrupt where this process is
-    told to stop, RuntimeError where a cluster goes away, ValueError where it cannot be reached; runs keep what is done.
+    stopped by a signal, RuntimeError where a cluster is lost, ValueError where it cannot be reached. Runs keep what is
+    done.
     """
     every = {one.task.name: one for one in planned}
     before = {name: done for name, one in every.items() if (done := done_before(one.task)) is not None}

@@ -1,8 +1,8 @@
 """Where tasks are carried out: this process, processes here, or a cluster of dask.distributed.
 
 The scheduler of dask gives a task to a worker, and to another where that one dies. A task is known to it by its key, so
-that a client that comes back finds what is under way; and it goes on without a client. A client that is interrupted
-takes back what has not begun, and another that waits for the same gives it again; processes here keep what they have
+that a client that returns finds what is under way. It continues without a client. A client that is interrupted
+withdraws what has not begun, and another that waits for the same submits it again. Processes here keep what they have
 done before they end.
 """
 
@@ -49,8 +49,8 @@ def carry_out_all(
     """Carry out all tasks; `on_outcome` is called in this thread as each ends, in whatever order.
 
     `cores`: how many a process here takes for a task whose settings do not state its threads. Raises KeyboardInterrupt
-    where this process receives a signal to stop; RuntimeError where the cluster is lost; ValueError where it cannot be
-    reached or dask is missing. Finished work is in the run folders.
+    where this process receives a signal to stop. Raises RuntimeError where the cluster is lost, ValueError where it
+    cannot be reached or dask is missing. Finished work is in the run folders.
     """
     if scheduler is None and workers == 1:
         for task in tasks:

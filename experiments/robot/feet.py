@@ -136,8 +136,8 @@ def too_fast(plan: RobotPlan, run: RobotRun, heights: Array, laws: Collection[st
 def feet_quantities(reached: dict[str, dict[str, float]]) -> dict[str, tuple[float, str, str]]:
     """Name of a quantity -> value, unit and note, for the table of a run.
 
-    A robot of one foot has its clearance; one of up to `FEW` feet clearance and sinkage of each; others the largest
-    clearance of any foot.
+    A robot of one foot has its clearance. One of up to `FEW` feet has clearance and sinkage of each. Others have the
+    largest clearance of any foot.
     """
     best = max(reached, key=lambda name: reached[name]["clearance_largest"])
     if len(reached) == 1 or len(reached) > FEW:

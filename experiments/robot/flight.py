@@ -83,7 +83,7 @@ def to_landing(run: RobotRun, heights: Array) -> str:
 
 def at_end(run: RobotRun, heights: Array) -> tuple[float, float, float] | None:
     """What is left of a flight at the end of a run: rise of the centre of mass from there [m], its speed upwards [m/s],
-    and the time to the landing [s]; None where gravity alone does not bring the robot back.
+    and the time to the landing [s]. None where gravity alone does not bring the robot back.
 
     ``heights``: as of `to_landing`. MuJoCo continues the flight; where that takes too long it is a parabola, whose rise
     is v^2 / 2 g, 0 where the robot already falls.

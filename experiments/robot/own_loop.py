@@ -27,9 +27,9 @@ class LawOfRun:
 def law_of_run(model: Any, feet: Sequence[str], **settings: Any) -> LawOfRun:
     """The law that `hedgebed mujoco` puts under `feet` of a mujoco.MjModel, in the model's gravity.
 
-    ``feet``: names of geoms or patterns of them. ``settings``: surface, ground (a law or a ground.toml), keyframe (the
-    posture in which the size of a foot counts) and the other options of the command that belong to a law, by their
-    names. Raises ValueError as the command does, and for a ground of grains.
+    ``feet``: names of geoms or patterns of them. ``settings``: options of the command that belong to a law, by their
+    names: surface, ground (a law or a ground.toml), keyframe (the posture in which the size of a foot counts) and
+    others. Raises ValueError as the command does, and for a ground of grains.
     """
     own = RobotSettings(model="model", feet=tuple(feet), **settings)
     if own.on_grains:

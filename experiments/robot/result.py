@@ -87,6 +87,14 @@ class RobotFrames(PlatformFrames[RobotRun]):
         force = run.feet_now[:, 7:10].sum(axis=0)
         return {f"force_{axis}": float(force[k]) for k, axis in enumerate("xyz")}
 
+    def push(self, values: Mapping[str, float]) -> float:
+        """The ground's force on the robot as frames keep it, in single precision: a resumed run reads it from them."""
+        return float(np.linalg.norm([np.float32(values[f"force_{axis}"]) for axis in "xyz"]))
+
+    def least_push(self, run: RobotRun) -> float:
+        """Half of the robot's weight [N]: the forces of a first touch rise from 0 in many steps."""
+        return 0.5 * float(run.robot.mass * run.robot.gravity)
+
     def row_forces(self, run: RobotRun, origin: Array) -> tuple[Array, dict[str, Array]]:
         """At the lowest point of every foot that is pushed."""
         feet = run.feet_now

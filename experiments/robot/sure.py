@@ -1,7 +1,7 @@
 """How sure the answer of a robot's run is: on a law what its numbers leave open, over several beds their scatter.
 
-On a law the same robot runs again at both ends of what is known: K of the surface one standard deviation lower and
-higher, or at the ends of its range; of a ground file each uncertain parameter by itself (`law_spread`).
+On a law the same robot runs again at both ends of what is known. K of the surface is one standard deviation lower and
+higher, or at the ends of its range. Of a ground file each uncertain parameter is moved by itself (`law_spread`).
 """
 
 import math
@@ -10,6 +10,7 @@ from dataclasses import replace
 
 from experiments.platform.law_spread import moved, spread_of_law
 from experiments.runs.types import Json
+from rigid.intervals import NORMAL
 from vis.page.numbers import between, foldable, quote
 from vis.robot.answer import BALLISTIC
 
@@ -66,13 +67,13 @@ def sure_of_law(plan: RobotPlan, best: Answer, follow: Callable[[RobotPlan], Ans
 
 
 def _of_file(plan: RobotPlan, best: Answer, follow: Callable[[RobotPlan], Answer]) -> tuple[Json, str]:
-    """One standard deviation of the parameters of a ground file."""
+    """95 % intervals by the errors of the parameters of a ground file."""
     assert plan.fitted is not None
     if not moved(plan.fitted):
         return _not_known(plan, say("no_range_of_law", law=plan.law))
     stds = spread_of_law(plan.fitted, lambda file: follow(replace(plan, fitted=file)), best)
-    spreads = {name: std or 0.0 for name, std in stds.items()}
-    sure = {name: entry(name, best[name], best[name] - std, best[name] + std) for name, std in spreads.items()}
+    halves = {name: NORMAL * (std or 0.0) for name, std in stds.items()}
+    sure = {name: entry(name, best[name], best[name] - half, best[name] + half) for name, half in halves.items()}
     return sure, say("of_file", words=in_words(sure, half=False))
 
 

@@ -30,6 +30,7 @@ from pydantic import BaseModel
 
 from dem.files.arrays import read_arrays
 from hedgebed_renamed import BEFORE_RUN_2, BEFORE_RUN_3
+from rigid.checks import alike
 from rigid.digests import check_digests, digest_of, digest_of_data
 from rigid.result import plain, read_json, read_result, toml_value, write_json, write_text
 from rigid.series import read_series, replacing, write_series
@@ -228,7 +229,7 @@ class RunFolder:
         """Make the folder of a new run and write its run.toml.
 
         Raises ValueError, naming the path, if it is in use (a file, or a folder that holds something) or cannot be
-        written; and if the settings would not read back from run.toml as they are.
+        written. Also if the settings would not read back unchanged from run.toml.
         """
         path = Path(path)
         text, where = settings_toml(command, settings, version, code), f"out = {str(path)!r}"
@@ -267,7 +268,8 @@ class RunFolder:
         try:
             table = tomllib.loads((path / "run.toml").read_text(encoding="utf-8"))
         except OSError:
-            raise ValueError(f"{str(path)!r} is not a run folder: it has no run.toml") from None
+            why = "it has no run.toml" if path.is_dir() else f"there is no such folder{alike(path, folders=True)}"
+            raise ValueError(f"{str(path)!r} is not a run folder: {why}") from None
         except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
             raise ValueError(f"{str(path / 'run.toml')!r} cannot be read: {error}") from None
         if table.get("format") not in RUN_FORMATS or not isinstance(table.get("settings"), dict):

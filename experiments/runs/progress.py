@@ -108,9 +108,8 @@ class Progress(AbstractContextManager["Progress"]):
     `stage_fraction`, `fraction` are in 0..1, or None where a total was not given; `remaining()` is in seconds.
 
     The whole is reckoned in time: what has passed over that and what is to come. Stages to come take their costs at the
-    rate so far; the one under way moves from its cost to its own pace as it goes. A stage that was over without an
-    `update` found its work done, as a bed in the cache, and says nothing about the rate. A share once shown is never
-    taken back.
+    rate so far. The one under way moves from its cost to its own pace. A stage that was over without an `update` found
+    its work done, as a bed in the cache, and says nothing about the rate. A share once shown is never taken back.
     """
 
     def __init__(self, *, clock: Callable[[], float] = time.monotonic):

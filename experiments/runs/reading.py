@@ -17,7 +17,7 @@ from pydantic_core import ErrorDetails
 from experiments.runs.folder import RUN_FORMATS, settings_in
 from experiments.runs.strict import may_be_empty
 from experiments.runs.units import find_unit, in_both
-from rigid.checks import nearest
+from rigid.checks import nearest, why_unread
 
 __all__ = ["Layer", "find_case", "gravities_told", "option", "read_case", "settings_from"]
 
@@ -46,8 +46,8 @@ def option(name: str) -> str:
 def find_case(given: Path, shipped: Path, commands: Iterable[str] = ()) -> Path:
     """The case file that `given` means: a path, or the name of one in the folder `shipped`.
 
-    Raises ValueError naming those that ship and are spelt like it, or where none is, those of the folder itself; first
-    of all the one of `commands`, whose words may stand in the same place, that is spelt like it.
+    Raises ValueError naming those that ship and are spelt like it, or where none is, those of the folder itself. A word
+    of `commands` that is spelt like it is named first, since it may stand in the same place.
     """
     if given.is_file():
         return given
@@ -57,6 +57,9 @@ def find_case(given: Path, shipped: Path, commands: Iterable[str] = ()) -> Path:
                 return named
     if meant := get_close_matches(str(given), list(commands), n=1):
         raise ValueError(f"{str(given)!r} is neither a command nor a file; did you mean {meant[0]!r}?")
+    own = given if given.suffix else given.with_suffix(".toml")
+    if "did you mean" in (why := why_unread(own, FileNotFoundError())):
+        raise ValueError(f"case = {str(given)!r}: {why}")
     names = sorted(path.stem for path in shipped.glob("*.toml"))
     below = sorted(path.stem for path in shipped.glob("*/*.toml"))
     if close := get_close_matches(given.name.removesuffix(".toml"), [*names, *below], n=_NEAR):
@@ -86,8 +89,8 @@ def read_case(path: Path) -> Layer:
 def settings_from(settings_class: type[Settings], layers: Iterable[Layer]) -> Settings:
     """The settings that the `layers` give, later ones over earlier ones, over the defaults.
 
-    A number may be text with a unit (`experiments.runs.units`). Raises ValueError, one sentence a line, for an unknown
-    name (with the nearest known one) and for a value that is not accepted (with the accepted ones). TOML has no null:
+    A number may be text with a unit (`experiments.runs.units`). Raises ValueError, one sentence a line. An unknown name
+    is answered with the nearest known one, a value that is not accepted with the accepted ones. TOML has no null:
     "none" unsets a setting that need not be set.
     """
     names = list(settings_class.model_fields)

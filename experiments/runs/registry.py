@@ -4,9 +4,9 @@ and one module.
 The module of an experiment offers
 ``run(settings, folder: Path, *, progress: Progress) -> Result`` (as result.json has it) and
 ``resume(folder: Path, *, progress: Progress) -> Result``;
-if it also has ``check(settings) -> None``, that is called before a folder is made and raises ValueError for what
-the settings class cannot see; if it has ``fingerprint() -> str``, a digest of what computes, run.toml keeps it.
-Both names are text here so that help does not wait for Taichi.
+It may have ``check(settings) -> None``, which is called before a folder is made and raises ValueError for what the
+settings class cannot see. It may have ``fingerprint() -> str``, a digest of what computes, which run.toml keeps. Both
+names are text here so that help does not wait for Taichi.
 """
 
 import tomllib

@@ -7,6 +7,7 @@ import sys
 import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stdout
+from difflib import get_close_matches
 from io import IOBase
 from pathlib import Path
 from types import FrameType
@@ -52,6 +53,8 @@ def fault_words(error: Exception) -> str:
             return f"{error.argument.name} = {typed}: expected {count} values, got {got}{about}"
     if isinstance(error, UnusedCliTokensError):
         return f"{' '.join(error.unused_tokens or [])} belongs to no option and to no argument; --help lists them"
+    if isinstance(error, UnknownOptionError):
+        text = re.sub(r" Did you mean (--\S+?)\?", lambda found: found[0] if _like(error, found[1]) else "", text)
     if isinstance(error, UnknownOptionError) and "Did you mean" not in text:
         command = " ".join(error.command_chain or ())
         if error.token and error.token.keyword == "--out" and command in PRINTING:
@@ -62,6 +65,12 @@ def fault_words(error: Exception) -> str:
         if unit and unit[0] != "1":
             text = f"{text.rstrip('.')}: give a number in {unit[0]}"
     return text
+
+
+def _like(error: UnknownOptionError, option: str) -> bool:
+    """Whether an option is spelt so much like the unknown one that it may be meant."""
+    typed = (error.token.keyword or error.token.value) if error.token else ""
+    return bool(get_close_matches(typed.strip("-"), [option.strip("-")]))
 
 
 def file_words(error: OSError, place: str) -> str:

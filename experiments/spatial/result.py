@@ -104,8 +104,8 @@ def path_columns(run: SpatialRun) -> Json:
 def feet_columns(run: SpatialRun) -> Json:
     """The columns of series/feet.csv: force, slip and depth of the spikes that came down, and of the hull if it did.
 
-    Those that never did are left out; so are the hull's depth, which no ground gives, and friction on a law,
-    which gives only its bound.
+    Those that never did are left out. So is the hull's depth, which no ground gives, and friction on a law, which gives
+    only its bound.
     """
     columns: Json = {"t_s": run.columns["time"]}
     feet, hull = run.feet, len(run.trial.platform.tips)

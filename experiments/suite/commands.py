@@ -24,7 +24,8 @@ __all__ = ["add_suite_commands"]
 
 RESULTS, WORK = Path("docs/results"), Path("runs/experiments")
 _Names = Annotated[
-    tuple[str, ...], Parameter(help="Names of cases, or the beginnings of names; all if not given.", negative="")
+    tuple[str, ...],
+    Parameter(help="Names of cases, or the beginnings of names; all if not given.", negative="", show_default=False),
 ]
 _Results = Annotated[
     Path, Parameter(help="Folder of the kept results; each case has its own folder in it.", negative="")

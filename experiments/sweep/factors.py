@@ -13,6 +13,7 @@ from pydantic import BaseModel
 from experiments.runs.reading import nearest
 from experiments.runs.strict import plain_kinds
 from experiments.runs.units import find_unit, has_unit
+from rigid.checks import why_unread
 
 __all__ = ["Factor", "parse_fixed", "parse_over", "read_table", "unit_of", "words_of"]
 
@@ -74,7 +75,7 @@ def read_table(path: str, settings_class: type[BaseModel]) -> Sequence[Mapping[s
         with Path(path).open(newline="", encoding="utf-8") as file:
             numbered = [(number, row) for number, row in enumerate(csv.reader(file), 1) if any(map(str.strip, row))]
     except OSError as error:
-        raise ValueError(f"table = {path!r} cannot be read: {error.strerror}") from None
+        raise ValueError(f"table = {path!r} cannot be read: {why_unread(path, error)}") from None
     except (UnicodeDecodeError, csv.Error) as error:
         raise ValueError(f"table = {path!r} is no CSV file: {error}") from None
     if len(numbered) < 2:

@@ -1,9 +1,9 @@
 """What a sweep comes to: one table of all runs as CSV and netCDF, the spread of each quantity, and sensitivities.
 
-Sensitivities are shares of the variance: of Saltelli's design Sobol' indices, first order and total (Saltelli et al.,
-Computer Physics Communications 181, 2010, 259-270); of a Latin hypercube first order alone, by RBD-FAST (Tarantola,
-Gatelli and Mara, Reliability Engineering and System Safety 91, 2006, 717-727). Both are SALib's. Each sample counts by
-its mean over the lists that it is combined with.
+Sensitivities are shares of the variance. Saltelli's design has Sobol' indices, first order and total (Saltelli and
+others, Computer Physics Communications 181, 2010, 259-270). A Latin hypercube has the first order alone, by RBD-FAST
+(Tarantola, Gatelli and Mara, Reliability Engineering and System Safety 91, 2006, 717-727). Both are SALib's. Each
+sample counts by its mean over the lists that it is combined with.
 """
 
 import itertools
@@ -214,7 +214,6 @@ def _typed(unit: str, values: Sequence[object]) -> list[str]:
 
 def _cells(unit: str, values: Array, *, exact: bool = False) -> list[str]:
     """The unit and numbers of a table for reading, as in other reports: lengths in mm, angles in degrees."""
-    unit, values = ("degrees", np.degrees(values)) if unit == "rad" else (unit, values)
     shown, numbers = in_one_unit(values.tolist(), unit or "1", significant=6 if exact else 4, exact=exact)
     return [shown, *numbers]
 

@@ -7,6 +7,7 @@ from pydantic import Field, field_validator, model_validator
 
 from experiments.runs.registry import EXPERIMENTS
 from experiments.runs.strict import Scheduler, SeedNumber, StrictSettings, Threads
+from rigid.checks import nearest
 from rigid.result import toml_value
 
 __all__ = ["SweepSettings"]
@@ -19,7 +20,7 @@ class SweepSettings(StrictSettings):
 
     # What is run
     experiment: str = ""
-    """The experiment whose settings are varied, by its name on the command line."""
+    """The experiment whose settings are varied, by its name on the command line; it must be given."""
     base: str | None = Field(None, min_length=1)
     """Case file of that experiment, or the name of one that ships, which all runs start from."""
     fixed: tuple[str, ...] = ()
@@ -67,7 +68,7 @@ class SweepSettings(StrictSettings):
         if not self.experiment:
             raise ValueError(f"experiment must be given, {_EXAMPLE}: one of {', '.join(known)}")
         if self.experiment not in known:
-            raise ValueError(f"experiment = {self.experiment!r} cannot be swept: one of {', '.join(known)} is accepted")
+            raise ValueError(f"experiment = {self.experiment!r} cannot be swept; {nearest(self.experiment, known)}")
         if not self.over and self.table is None:
             raise ValueError("nothing is varied: give over, as over = ['torque=[0.2, 0.25]'], or table")
         if self.scheduler is not None and self.workers is not None:

@@ -1,7 +1,7 @@
 """`hedgebed tumble --sweep KEY=FROM:TO:STEP`: the same tumble over a range of one number, or over two.
 
 All trials are integrated at once by the batched model (`rigid.simulate_batch`). The trial in the middle, or the one
-nearest to it that can stand, is the run's own, integrated accurately; it and the corners show the error of the batch.
+nearest to it that can stand, is the run's own, integrated accurately. It and the corners show the error of the batch.
 """
 
 import itertools
@@ -22,6 +22,7 @@ from rigid.batch.simulate import BatchTrajectory, simulate_batch
 from rigid.planar.dynamics import System
 from rigid.planar.simulate import PAPER_STEP, longest_step, simulate
 from rigid.planar.statics import standing
+from vis.page.sentences import label_of
 
 from . import say
 from .settings import TumbleSettings
@@ -194,7 +195,8 @@ class Sweep:
         count = len(self.plans)
         shown = sorted({round(k) for k in np.linspace(0, count - 1, min(count, MOST_ROWS))})
         head = [key + ("" if unit == "1" else f" [{unit}]") for key, unit in units.items()]
-        head += ["angle [degrees]", "speed [m/s]", "turning [rad/s]", "slips from", "hops from"]
+        head += ["angle [degrees]", "speed [m/s]", "turning [rad/s]"]
+        head += [f"{label_of(name)} [degrees]" for name in ("transition_angle_slip", "transition_angle_hop")]
         rows = [
             [
                 *(f"{value:g}" for value in self.values[place]),

@@ -36,8 +36,8 @@ class SweepRange:
 def parse_sweep(texts: tuple[str, ...]) -> tuple[SweepRange, ...]:
     """The ranges of one key or two, in the units of `unit_of`.
 
-    Raises ValueError for text that is no range; an unknown key; a unit of another kind or at only some of the three
-    numbers; one key twice; more than two keys; and more than 2,500 trials.
+    Raises ValueError for text that is no range, an unknown key, and a unit of another kind or at only some of the three
+    numbers. Also for one key twice, more than two keys, and more than 2,500 trials.
     """
     ranges = tuple(_one(text) for text in texts)
     keys = [each.key for each in ranges]
@@ -111,7 +111,7 @@ def _check_key(key: str, text: str) -> None:
     effect, dot, name = key.partition(".")
     if not dot:
         if key not in SWEEPABLE:
-            known = f"{nearest(key, SWEEPABLE)}, or effect.parameter such as pendulum.length"
+            known = f"a parameter of an effect is accepted as pendulum.length is; {nearest(key, SWEEPABLE)}"
             raise ValueError(f"sweep = {text!r}: {key} is no number that can be swept; {known}")
         return
     if effect not in EFFECTS:

@@ -74,11 +74,11 @@ def plan_tumble(
     fitted: GroundFile | None = None,
 ) -> TumblePlan:
     """The trial that `settings` describe. `model_file` replaces ``settings.model``, where that was copied; `platform`
-    replaces ``settings.platform``, where that was read; `spikes` those of the platform; and `fitted` the ground file of
-    ``settings.ground``.
+    replaces ``settings.platform``, where that was read. `spikes` replace those of the platform, `fitted` the ground
+    file of ``settings.ground``.
 
-    Raises ValueError, naming the setting, for an unknown surface, law, effect or parameter; a model that cannot be
-    read; and numbers that no platform or rig can have.
+    Raises ValueError, naming the setting, for an unknown surface, law, effect or parameter, and for a model that cannot
+    be read. Also for numbers that no platform or rig can have.
     """
     source = model_file if model_file is not None else Path(settings.model) if settings.model is not None else None
     model = _read(source) if source is not None else None

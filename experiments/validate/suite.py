@@ -1,7 +1,6 @@
 """Every case of the verification suite, in the order of the table."""
 
 import ast
-import difflib
 import hashlib
 import pkgutil
 import sys
@@ -11,6 +10,8 @@ from functools import partial
 from importlib import import_module
 from importlib.util import resolve_name
 from pathlib import Path
+
+from rigid.checks import nearest
 
 from . import base, beds, contacts, measured
 from .base.case import Case, Compute
@@ -44,9 +45,7 @@ def chosen(only: Sequence[str] = (), *, quick: bool = False, held: bool = False)
     known = {case.id: case for case in SUITE}
     for name in only:
         if name not in known:
-            near = difflib.get_close_matches(name, known, n=1)
-            hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(known)}"
-            raise ValueError(f"only = {name!r} is no case of the suite; {hint}")
+            raise ValueError(f"only = {name!r} is no case of the suite; {nearest(name, known)}")
     found = [case for case in SUITE if (not only or case.id in only) and not (quick and case.slow)]
     found = [case for case in found if case.measured or not held]
     if not found:

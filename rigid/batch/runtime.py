@@ -1,7 +1,7 @@
 """Taichi for the batch: started only where nobody has started it.
 
 Contract: `ensure` leaves a running Taichi alone, so the bed and the batch live in one process. The batch hands its
-arrays to kernels as numpy arrays and keeps no fields, so a bed that starts Taichi anew takes nothing from it; the
+arrays to kernels as numpy arrays and keeps no fields, so a bed that starts Taichi anew takes nothing from it. The
 kernels are then compiled again.
 """
 

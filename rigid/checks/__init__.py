@@ -79,6 +79,25 @@ def nearest(word: str, words: Iterable[str]) -> str:
     return f"the most alike of {len(words)} are {', '.join(alike)}; --help lists all"
 
 
+def alike(path: str | Path, *, folders: bool = False) -> str:
+    """``; did you mean 'x'?`` for the file beside `path`, or the folder, that is spelt like it; empty where none is."""
+    path = Path(path)
+    there = path.parent.iterdir() if path.parent.is_dir() else ()
+    stems = [one.stem for one in there if one.is_dir() == folders and one.suffix == path.suffix]
+    close = get_close_matches(path.stem, stems, n=1)
+    return f"; did you mean {str(path.with_name(close[0] + path.suffix))!r}?" if close else ""
+
+
+def why_unread(path: str | Path, error: OSError) -> str:
+    """Why a file could not be read: of one that is not there, with the file of its folder that is spelt like it."""
+    path = Path(path)
+    if not isinstance(error, FileNotFoundError):
+        return str(error.strerror)
+    if not path.parent.is_dir():
+        return f"there is no folder {str(path.parent)!r}"
+    return f"there is no such file{alike(path)}"
+
+
 def is_number(value: Any) -> bool:
     """Whether `value` is a real number, of numpy too, and not a bool."""
     return isinstance(value, Real) and not isinstance(value, bool)
@@ -168,6 +187,6 @@ def read_toml(path: Path) -> dict[str, Any]:
     try:
         return tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
-        raise ValueError(f"{path}: cannot be read: {error.strerror}") from None
+        raise ValueError(f"{path}: cannot be read: {why_unread(path, error)}") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ValueError(f"{path}: is not TOML: {error}") from None

@@ -22,6 +22,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
+from rigid.checks import why_unread
+
 from .rft import tractions
 
 __all__ = ["RFT_FORMAT", "Pieces", "RftTable", "box_pieces", "mesh_pieces", "read_rft", "round_pieces"]
@@ -127,7 +129,7 @@ class RftTable(BaseModel):
     bulk_density: Positive  # [kg/m3]
     surface_friction: Annotated[float, Field(ge=0, allow_inf_nan=False)]  # of grains and body [1]
     factors: Factors  # xi_1, xi_2, xi_3 [N/m3], b [1]
-    stds: Factors  # standard deviation of each between fits that leave out one bed
+    stds: Factors  # standard error of each, by fits that leave out one bed (jackknife)
     left_out: tuple[Factors, ...]  # The factors of those fits
     unseen: Annotated[float, Field(ge=0)]  # rms of the error of plates that were not fitted, over their force [1]
     shape_errors: tuple[Finite, Finite] | None = None  # of other shapes: rms and largest, over their force [1]
@@ -146,12 +148,12 @@ class RftTable(BaseModel):
     def force(
         self, pieces: Pieces, *, depth: float, direction: ArrayLike, gravity: float | None = None
     ) -> tuple[Array, Array]:
-        """Force on a body [N] and its standard deviation [N], each of shape [3]; z up.
+        """Force on a body [N] and its standard error [N], each of shape [3]; z up.
 
         `depth`: of the origin of the body below the undisturbed surface [m]. `direction`: of its motion, any length,
-        shape [3]. `gravity` [m/s2]: that of the table if not given; the force is in proportion to it. The deviation is
-        that of the factors between beds. It does not contain the error of the law itself, `unseen`. Raises
-        ValueError for a direction without length.
+        shape [3]. `gravity` [m/s2]: that of the table if not given; the force is in proportion to it. The error is
+        that of the factors, from the beds (jackknife). It does not contain the error of the law itself, `unseen`.
+        Raises ValueError for a direction without length.
         """
         scale = 1.0 if gravity is None else gravity / self.gravity
         best = scale * law_force(self.factors, self.surface_friction, pieces, depth, direction)
@@ -206,7 +208,7 @@ def law_force(factors: ArrayLike, surface_friction: float, pieces: Pieces, depth
 
 
 def jackknife_std(left_out: ArrayLike) -> Array:
-    """Standard deviation of numbers from those without each bed (Efron 1982), shape [n] from shape [bed, n]."""
+    """Standard error of numbers from those without each bed (Efron 1982), shape [n] from shape [bed, n]."""
     each = np.asarray(left_out, dtype=float)
     return np.asarray(np.sqrt((len(each) - 1) / len(each) * ((each - each.mean(axis=0)) ** 2).sum(axis=0)))
 
@@ -225,7 +227,9 @@ def read_rft(path: str | Path) -> RftTable:
     try:
         return RftTable(**json.loads(path.read_text(encoding="utf-8")))
     except OSError as error:
-        raise ValueError(f"{path}: cannot be read: {error.strerror}") from None
+        raise ValueError(
+            f"{path}: cannot be read, rft.json of `hedgebed bed test plates` was expected: {why_unread(path, error)}"
+        ) from None
     except (json.JSONDecodeError, UnicodeDecodeError, TypeError) as error:
         raise ValueError(f"{path}: no JSON table of `hedgebed bed test plates`: {error}") from None
     except ValidationError as error:

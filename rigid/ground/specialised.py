@@ -2,9 +2,9 @@
 
 For loops that evaluate one law under one foot very often (`coupling.robot.FootForces`). Each function of
 `rigid.ground.law_functions` is a list of statements that ends with the only `return`. So its source can be copied with
-p[k] replaced by a constant. A term that is then multiplied by 0 is left out, and so are a factor or exponent of 1, a
-question whose answer is known as the depth is above 0, and a variable that nothing reads. For finite numbers that
-changes no bit, but for the sign of a zero. Half of the terms of 3D-RFT under a flat foot are such.
+p[k] replaced by a constant. A term that is then multiplied by 0 is left out, and so is a factor or exponent of 1. So is
+a condition whose answer is known because the depth is above 0, and a variable that nothing reads. For finite numbers
+that changes no bit, but for the sign of a zero. Half of the terms of 3D-RFT under a flat foot are such.
 """
 
 import ast

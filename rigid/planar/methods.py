@@ -5,9 +5,10 @@ Norsett and Wanner, Solving Ordinary Differential Equations I, table II.5.2 and 
 of nine to eleven numbers (`rigid.planar.dynamics`): faster in plain Python than arrays so short.
 
 Implicit (`Implicit`), for ground whose damper is so strong that explicit steps would have to be a small share of M / C:
-extrapolation of linearly implicit Euler steps, (I - h J) d = h f(t + h, z), over 1 to 5 parts of the step, of order 5;
-the error from the last two of order 5 and 4, as steep as the explicit pair's (Hairer and Wanner, Solving Ordinary
-Differential Equations II, section IV.9). J is found by differences once for all steps that begin at one state.
+extrapolation of linearly implicit Euler steps, (I - h J) d = h f(t + h, z), over 1 to 5 parts of the step, of order 5.
+The error is the difference of the last two, of order 5 and 4, as steep as the explicit pair's. See Hairer and Wanner,
+Solving Ordinary Differential Equations II, section IV.9. J is found by differences once for all steps that begin at one
+state.
 """
 
 import math

@@ -1,8 +1,8 @@
 """Flywheels: what a motor and a brake can do to one, over time.
 
 Conventions of the planar model: a torque on the platform is the reaction of a flywheel, whose absolute speed changes as
-|d omega_w / dt| = tau / J_w. A motor drives the wheel away from the platform's turning sense and is at its end when the
-wheel is at its limit; a brake takes a wheel that turns with the platform to rest, and is at its end then.
+|d omega_w / dt| = tau / J_w. A motor drives the wheel against the platform's turning sense. It ends when the wheel is
+at its limit. A brake stops a wheel that turns with the platform, and ends then.
 """
 
 import math

@@ -76,8 +76,8 @@ def combine(parts: Sequence[Part]) -> tuple[float, Array, Array]:
 def check_inertia(tensor: ArrayLike, mass: float, reach: float, *, called: str = "inertia") -> Array:
     """`tensor` [kg m2] as an array [3, 3], if a body of `mass` [kg] with no matter farther out than `reach` [m] has it.
 
-    Raises ValueError for a tensor that is not symmetric, for a principal moment of 0 or less, and for one above the sum
-    of the other two. No moment may exceed m r^2, that of all the mass at `reach` r, and their sum 2 m r^2.
+    Raises ValueError for a tensor that is not symmetric, and for a principal moment of 0 or less or above the sum of
+    the other two. No moment may exceed m r^2, that of all the mass at `reach` r, and their sum 2 m r^2.
     """
     inertia = np.asarray(tensor, dtype=float)
     if inertia.shape != (3, 3) or not np.isfinite(inertia).all():

@@ -1,9 +1,10 @@
 """Six degrees of freedom: a platform with up to three flywheels, in flight and on flat ground with Coulomb friction.
 
-`simulate` integrates a `SpatialTrial`. Between events (a tip touches or lifts, starts or stops to slide, a torque
-changes) Dormand and Prince's pair of orders 5 and 4; events are located by repeating the step with other lengths.
-Momentum and angular momentum are states, so flight keeps them to round-off. Started in the plane it moves as the planar
-model does (`rigid.simulate`), a planar row being the tips side by side. How friction sticks: `rigid.spatial.motion`.
+`simulate` integrates a `SpatialTrial`. Between events it uses Dormand and Prince's pair of orders 5 and 4. An event is
+that a tip touches or lifts, starts or stops to slide, or that a torque changes. Events are located by repeating the
+step with other lengths. Momentum and angular momentum are states, so flight keeps them to round-off. Started in the
+plane it moves as the planar model does (`rigid.simulate`), a planar row being the tips side by side. How friction
+sticks: `rigid.spatial.motion`.
 """
 
 import math

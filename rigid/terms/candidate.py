@@ -2,7 +2,7 @@
 
 A candidate has words for reports and, for each kind of trial that can show it, forms: the shapes that nature's law may
 come close to. The numbers of a form are fitted in coordinates in which zero is the base model (1 / length of a
-pendulum, exponent - 1); `Number.how` says how the parameter of the term follows. A scale such as the reach of adhesion
+pendulum, exponent - 1). `Number.how` says how the parameter of the term follows. A scale such as the reach of adhesion
 is fitted as a logarithm about a typical value, with a prior of one factor of e: otherwise a fit without information
 about it would not end. A bent form is fitted only after the plain one, from where that ended.
 """
@@ -126,8 +126,8 @@ class Push:
 
     `grown`: the force so far; `x` = z / D; `at`: depth at which the loading curve is read; `most` and `ever`: deepest
     depth since it entered, and of all; `way`: direction of the motion, -1 to 1; `share`: of a friction that takes a
-    distance to turn round, -1 to 1; `gone`: how far the bed has given way for good by this effect (the loading curve is
-    read less deep by the sum over all effects); `z` of `settle`: the depth less what the other effects have given way;
+    distance to turn round, -1 to 1; `gone`: how far the bed has given way for good by this effect. The loading curve is
+    read less deep by the sum over all effects. `z` of `settle`: the depth less what the other effects have given way;
     `radius_depth`: at which the tip is wholly in; `reference`: D. Depths in m, speeds in m/s, downwards.
     """
 

@@ -2,7 +2,7 @@
 
 A hook is plain arithmetic on numbers, without loops or early returns. So the same source runs as Python in the accurate
 integrator and, compiled by Taichi, in the batch. Mathematical functions are those of `math`, imported by name (`from
-math import exp`); a hook may call plain functions of another module (`rigid.terms.curves`), none of its own file. What
+math import exp`). A hook may call plain functions of another module (`rigid.terms.curves`), none of its own file. What
 its arguments are called says what it gets: first the fixed ones listed below, then the term's own parameters, by name,
 in any number.
 
@@ -45,12 +45,12 @@ in any number.
 | `lens`               | square                    | x and y as the camera sees them over the true ones [1];      |
 |                      |                           | square: of the distance from the start [m2]                  |
 
-`settle` moves the undisturbed surface under one tip: the ground's law, and what stands on it (`crater`, `unload`,
-`hold`), read the depth below the surface that is left, depth - s.given_way; `rate_force` and `side_force` get the
-whole depth. Each term with `settle` has a state of its own, `gone`, and s.given_way is the sum over these terms. Its
-`depth` is the whole depth less what the other terms have given way: with one such term, the whole depth. So each term
-takes its share of the force that the others leave. What gives way takes the elastic force's work with it, so it never
-gives energy.
+`settle` moves the undisturbed surface under one tip. The ground's law, and what stands on it (`crater`, `unload`,
+`hold`), read the depth below the surface that is left, depth - s.given_way. `rate_force` and `side_force` get the whole
+depth. Each term with `settle` has a state of its own, `gone`, and s.given_way is the sum over these terms. Its `depth`
+is the whole depth less what the other terms have given way: with one such term, the whole depth. So each term takes its
+share of the force that the others leave. What gives way takes the elastic force's work with it, so it never gives
+energy.
 
 The four of `inner` go together and are for a term with something inside that moves: one coordinate `s.inner`, its rate
 `s.inner_speed` and one of two modes, `s.inner_mode` = 1 at the start, else 0. It is integrated beside the platform's

@@ -8,14 +8,18 @@ from pathlib import Path
 
 import pytest
 
+from experiments.platform.law_spread import spread_entries
 from experiments.runs.headline import headline_of, headline_of_tiles
 from experiments.runs.registry import EXPERIMENTS
 from rigid.result import read_result
 from vis.page.answer import MOST_ROWS, answer, write_page
 from vis.page.page import Page, Section, Tile, listing, text
+from vis.page.sentences import label_of
+from vis.paper.report import CASE_HEAD
 from vis.report import write_report
 from vis.robot.answer import answer_tiles
 from vis.tumble.answer import answer_tiles as tumble_tiles
+from vis.tumble.beside import beside_rows
 
 ON_GRAINS = {"experiment": "penetrate", "ground": "bed"}
 
@@ -151,20 +155,39 @@ def rows_of(result):
 
 def test_a_tumble_on_a_law_states_chance_the_parameters_of_the_law_and_the_known_bias():
     rows = rows_of(tumble_result())
-    assert rows["Trajectory angle"] == ("10°", "none", "9°", "+28° (grains)")
+    assert rows["Trajectory angle"] == ("10°", "none", "18°", "+28° (grains)")  # 1.96 x 9.1
     assert [cell.replace("\N{NO-BREAK SPACE}", " ") for cell in rows["Largest speed"]] == [
-        "0.159 m/s", "none", "0.007 m/s", "not validated",
+        "0.159 m/s", "none", "0.014 m/s", "not validated",
     ]  # fmt: skip
-    assert rows["Slips from"][2] == "0°", "no parameter changes it"
-    assert rows["Hops from"][2] == "not known", "on some of the moved laws it does not hop"
+    assert rows[label_of("transition_angle_slip")][2] == "0°", "no parameter changes it"
+    assert rows[label_of("transition_angle_hop")][2] == "not known", "on some of the moved laws it does not hop"
     assert rows["Largest sinkage"] == ("none", "–", "–", "–")
+
+
+def test_errors_of_a_law_are_halves_of_95_per_cent_intervals_in_table_head_note_and_sentence():
+    """1.96 standard deviations: the table, the sentence below it, and no word of one standard deviation."""
+    result = tumble_result()
+    numbers, note = answer(tumble_tiles(result), result)
+    entries = {"surface": "sand", "law": "", "parameters": ["stiffness"]}
+    _, sentence = spread_entries(result["quantities"], {"trajectory_angle": "angle"}, **entries)
+    assert "18°" in sentence and "95 %" in sentence
+    assert "95\N{NO-BREAK SPACE}%" in numbers.head[3] and "95 %" in note.text
+    assert not [words for words in (sentence, note.text, *numbers.head) if "deviation" in words]
+
+
+def test_what_slips_and_hops_has_one_name_in_answer_table_sweep_and_paper():
+    for name in ("transition_angle_slip", "transition_angle_hop"):
+        label = label_of(name)
+        assert label in rows_of(tumble_result())
+        assert label in [row[0] for row in beside_rows({}, {})]
+        assert f"{label} [degrees]" in CASE_HEAD
 
 
 def test_a_law_whose_parameters_have_no_error_says_that_it_is_not_known():
     result = tumble_result(law_spread={"parameters": []})
     result["quantities"]["transition_angle_hop"]["std"] = 0.0
     rows = rows_of(result)
-    assert rows["Slips from"][2] == rows["Hops from"][2] == "not known"
+    assert [rows[label_of(f"transition_angle_{one}")][2] for one in ("slip", "hop")] == ["not known"] * 2
 
 
 @pytest.mark.parametrize(
@@ -239,12 +262,16 @@ def test_a_fitted_number_has_its_standard_error_or_why_it_has_none():
 def test_a_comparison_has_both_numbers_their_spreads_and_the_difference():
     row = {"unit": "rad", "first": math.radians(10), "second": math.radians(-17), "difference": math.radians(-27)}
     compared = [
-        row | {"name": "trajectory_angle", "relative": None, "first_std": math.radians(9), "second_std": None},
+        row | {"name": "trajectory_angle", "relative": None, "first_half": math.radians(9), "second_half": None},
         {"name": "max_speed", "unit": "m/s", "first": 0.1, "second": 0.2, "difference": 0.1, "relative": 1.0},
     ]
     result = {"experiment": "compare", "compared": compared, "quantities": {"compared": {"value": 2}}}
     shown = headline_of(EXPERIMENTS["compare"], result)
-    assert shown.head[1:] == ("first | second", "± chance", "difference")
+    assert [head.replace("\N{NO-BREAK SPACE}", " ") for head in shown.head[1:]] == [
+        "first | second",
+        "± (95 %)",
+        "difference",
+    ]
     assert shown.rows[0] == ("Trajectory angle", "10° | −17°", "9° | –", "−27°")
     assert [cell.split() for cell in shown.rows[1][1:]] == [
         ["0.1", "m/s", "|", "0.2", "m/s"],

@@ -106,6 +106,20 @@ def test_resumed_series_is_the_uninterrupted_one(tmp_path):
         assert (tmp_path / "cut/frames" / name).read_bytes() == (tmp_path / "whole/frames" / name).read_bytes()
 
 
+def test_a_frame_of_a_moment_of_its_own_takes_the_place_of_the_last_such_frame(tmp_path):
+    writer = FrameWriter(tmp_path, name="robot")
+    for time, own in ((0.0, False), (0.04, True), (0.06, True), (0.1, False), (0.13, True), (0.2, False)):
+        writer.write(time, grains(int(1000 * time)), spike(), own_moment=own)
+    assert read_frames(tmp_path, "robot").times.tolist() == [0.0, 0.1, 0.13, 0.2]
+    read_frames(tmp_path, "robot").check()
+    names = [path.stem for path in (tmp_path / "frames").glob("robot_grains_*")]
+    assert sorted(names) == [f"robot_grains_{one}" for one in ("0000", "0001", "0002", "at_130000000")]
+    again = FrameWriter(tmp_path, name="robot", resume=True, keep_until=0.12)
+    again.write(0.2, grains(200), spike(), own_moment=True)
+    again.write(0.2, grains(200), spike())  # a frame at an even time at that moment takes its place
+    assert again.times == [0.0, 0.1, 0.2] and not list((tmp_path / "frames").glob("*_at_*"))
+
+
 def test_an_empty_bed_and_no_body(tmp_path):
     writer = FrameWriter(tmp_path)
     writer.write(0.0, {"position": np.zeros((0, 3)), "radius": np.zeros(0)})

@@ -2,9 +2,11 @@
 
 import math
 
+import numpy as np
 import pytest
 
-from vis.page.numbers import beside, between, column, plain, quantity, quote, typeset, within
+from vis.page.numbers import beside, between, column, plain, quantity, quote, scale_of, typeset, within
+from vis.sweep.report import on_axis
 
 SPACE = "\N{NO-BREAK SPACE}"
 
@@ -54,6 +56,17 @@ def test_quantity_takes_what_result_json_holds():
 def test_column_has_one_unit():
     assert column([0.229, 0.888, 1.8, None], "N") == ("N", ["0.229", "0.888", "1.80", "–"])
     assert column([0.04, 7e-4], "J") == ("mJ", ["40.0", "0.700"])
+    assert column([math.pi, None], "rad") == ("degrees", ["180", "–"])
+
+
+def test_axes_and_tables_have_one_unit_for_the_same_numbers():
+    for unit, values in (("rad", [0.1, 0.2]), ("m", [0.002]), ("m", [2.0]), ("J", [3e-3]), ("N/m", [90.0])):
+        scale, shown = scale_of(values, unit)
+        entry = {"unit": unit, "words": "it"}
+        drawn, label = on_axis(np.array(values), entry, "it")
+        assert drawn == pytest.approx(np.array(values) / scale) and label == f"it [{shown}]"
+        assert column(values, unit)[0] == shown
+    assert on_axis(np.array(["sand"]), {"unit": "1", "words": "it"}, "it")[1] == "it"
 
 
 def test_plain_keeps_to_its_digits():

@@ -137,7 +137,7 @@ def _drives(report: Report, labels: Labels) -> list[Block]:
 
 
 def answer_tiles(result: Result) -> list[Tile]:
-    """Numbers that both runs have: first and second, the spreads of both, and the difference."""
+    """Numbers that both runs have: first and second, half of the 95 % interval of both, and the difference."""
     wanted = (
         ("trajectory_angle", "Trajectory angle"), ("max_speed", "Largest speed"), ("largest_turn", "Largest turn"),
         ("highest", "Rise"), ("sinkage_largest", "Sinkage"), ("sinkage", "Sinkage"), ("stiffness", "Stiffness"),
@@ -151,13 +151,13 @@ def answer_tiles(result: Result) -> list[Tile]:
         if row is None or row["first"] is None or row["second"] is None:
             continue
         values = " | ".join(_in_unit(row[key], row["unit"]) for key in ("first", "second"))
-        stds = [row.get(f"{key}_std") for key in ("first", "second")]
-        spread = " | ".join(_in_unit(std, row["unit"], 2) if std else "\N{EN DASH}" for std in stds)
+        halves = [row.get(f"{key}_half") for key in ("first", "second")]
+        spread = " | ".join(_in_unit(half, row["unit"], 2) if half else "\N{EN DASH}" for half in halves)
         relative = row["relative"]
         sign = "+" if row["difference"] > 0 else ""
         share = "" if relative is None else f" ({sign if relative > 0 else ''}{plain(100 * relative, 2)} %)"
         change = f"{sign}{_in_unit(row['difference'], row['unit'])}{share}"
-        tiles.append(Tile(label, values, "", (spread if any(stds) else "", "", ""), change))
+        tiles.append(Tile(label, values, "", (spread if any(halves) else "", "", ""), change))
     return tiles[:MOST_ROWS]
 
 

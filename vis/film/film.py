@@ -56,6 +56,8 @@ _TALLEST = 2.0
 _LEAST = 0.2
 """Least scale of the arrows, over that at which none is shortened: a blow of more than ten weights is cut, with its
 number, so that others can be seen."""
+_MET = 0.95
+"""Of the largest force of a run: from there on a picture is at that moment."""
 _WORDS = {"start": "when the torque begins", "half": "half way round", "end": "at the end"}
 
 
@@ -218,17 +220,19 @@ def _moments_in_space(reels: Sequence[SpaceReel], coarse: AnyReel) -> list[tuple
     near = ", and a foot from near" if whence and len(reels) == 1 else ""
     behind = f" {say('behind_the_cut')}" if whence else ""
     names, pushes = {"start": 0.0, "middle": 0.5 * end, "end": end}, ""
-    hardest = int(np.argmax(first.loads))
+    hardest, met = int(np.argmax(first.loads)), False
     if len(reels) == 1 and 0 < hardest < len(first) - 1 and first.loads[hardest] > 0.0:
         names = {"start": 0.0, "force": float(first.times[hardest]), "end": end}
         pushes = say("hardest", force=quote(float(first.loads[hardest]), unit="N"))
-        if (most := (first.result.get("quantities") or {}).get("largest_force")) is not None:
+        most = (first.result.get("quantities") or {}).get("largest_force")
+        met = most is not None and float(first.loads[hardest]) >= _MET * float(most["value"])
+        if most is not None:
             pushes += say("hardest_of_all", force=quote(float(most["value"]), unit="N"))
         pushes += "."
     wanted = {name: float(coarse.times[coarse.nearest(time)]) for name, time in names.items()}
     if len(set(wanted.values())) < len(wanted):
         wanted = {name: time for name, time in wanted.items() if name in ("start", "end")}
-    titles = {"force": "At the largest force of all pictures"}
+    titles = {"force": "At the largest force" if met else "At the largest force of all pictures"}
     return [
         (name, titles.get(name, f"At the {name}"), time,
          f"{seen}, seen along y{whence}{near}, at {time:.4g} s.{pushes if name == 'force' else ''}{behind}")

@@ -104,7 +104,9 @@ def _errors(result: Mapping[str, Any], on_grains: bool) -> tuple[Sequence[str], 
     if experiment == "converge":
         return (say("of_95"), *_ERRORS[1:], say("all")), ["sum"]
     if kind_of(result) == "planar model" and experiment in _ON_ONE_LAW:
-        return (_ERRORS[0], say("of_one_law"), say("bias")), ["one_law"]
+        return (_ERRORS[0], say("of_the_law"), say("bias")), ["one_law"]
+    if experiment == "compare":
+        return (say("of_compare"), *_ERRORS[1:]), []
     if experiment == "mujoco":
         return _errors_of_robot(result, on_grains)
     else:

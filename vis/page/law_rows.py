@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from rigid.intervals import NORMAL
 from vis.page.limits import bias_of, kind_of
 from vis.page.numbers import quote, short, split_spread
 from vis.page.page import Tile
@@ -62,11 +63,11 @@ def cell_of(value: float | None, std: float | None, unit: str) -> str:
 
 
 def _with_error(result: Mapping[str, Any], name: str, law: bool) -> tuple[str, str]:
-    """The value of a number, and what the parameters of the law change of it."""
+    """The value of a number, and half of the 95 % interval that the errors of the law's parameters give it."""
     entry = result["quantities"][name]
     std = entry.get("std") if law else None
     if std:
-        value, error = split_spread(cell_of(entry["value"], std, entry["unit"]))
+        value, error = split_spread(cell_of(entry["value"], NORMAL * std, entry["unit"]))
         if error:
             return value, error
     if law and name in (result.get("law_spread") or {}).get("absent", ()):

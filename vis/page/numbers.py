@@ -24,6 +24,7 @@ __all__ = [
     "plain",
     "quantity",
     "quote",
+    "scale_of",
     "short",
     "split_spread",
     "typeset",
@@ -89,18 +90,28 @@ def short(value: float, significant: int = 4) -> str:
 def column(
     values: Sequence[float | None], unit: str, *, significant: int = 3, exact: bool = False
 ) -> tuple[str, list[str]]:
-    """Numbers of a table's column in one unit: the unit with the prefix that fits the largest, and the numbers.
+    """Numbers of a table's column in one unit, that of `scale_of`: the unit and the numbers.
 
     What is None or not finite is shown as a dash. ``exact``: Whether they are without zeros at their ends, as what was
     chosen is.
     """
-    known = [abs(value) for value in values if value is not None and math.isfinite(value)]
-    scale, shown = _scale(max(known, default=1.0), unit)
+    scale, shown = scale_of(values, unit)
     dash = "\N{EN DASH}"
     return shown, [
         dash if value is None or not math.isfinite(value) else (short if exact else plain)(value / scale, significant)
         for value in values
     ]
+
+
+def scale_of(values: Sequence[float | None], unit: str) -> tuple[float, str]:
+    """The unit in which readers see these numbers: how many SI units it is, and its name, such as (1e-3, "mm").
+
+    Angles are in degrees; elsewhere the largest finite number sets the prefix. "1" has no name.
+    """
+    if unit == "rad":
+        return math.pi / 180, "degrees"
+    known = (abs(value) for value in values if value is not None and math.isfinite(value))
+    return _scale(max(known, default=1.0), unit)
 
 
 def quote(value: float | None, std: float | None = None, unit: str = "1", *, significant: int = 3) -> str:
@@ -173,7 +184,7 @@ def quantity(entry: Any, *, unit: str | None = None, significant: int | None = N
     """A quantity of result.json, `{"value", "std", "unit"}` or a bare number; "unknown" where it is missing.
 
     ``entry``: The quantity. ``unit``: In place of its own unit, such as "%" for a share. ``significant``: Digits where
-    the uncertainty does not set them; by default two where that is unknown (a std of null), more would claim what no
+    the uncertainty does not set them. By default two where that is unknown (a std of null): more would claim what no
     one knows.
     """
     if isinstance(entry, Mapping):

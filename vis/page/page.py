@@ -164,10 +164,10 @@ _LETTERS = re.compile(r"[^\W\d_]{3,}")
 class Columns:
     """What the template needs beside the cells.
 
-    ``kinds``: Class of each column's cells: "" stays on one line, "parts" breaks between the parts of a number, "words"
-    and "prose" wrap, "prose" being never narrower than a readable line; with "anywhere", long words break. ``head``:
-    Cells of the head. ``rows``: Cells of the rows. ``beneath``: Whether the last column stands beneath each row, over
-    the table's whole width. ``many``: Whether there are so many columns that they move closer together.
+    ``kinds``: Class of each column's cells. "" stays on one line, "parts" breaks between the parts of a number. "words"
+    and "prose" wrap; "prose" is never narrower than a readable line. With "anywhere", long words break. ``head``: Cells
+    of the head. ``rows``: Cells of the rows. ``beneath``: Whether the last column stands beneath each row, over the
+    table's whole width. ``many``: Whether there are so many columns that they move closer together.
     """
 
     kinds: tuple[str, ...]

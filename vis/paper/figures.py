@@ -12,11 +12,12 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from rigid.intervals import half_width
+from rigid.intervals import NORMAL, half_width
 from vis.page.folder import read_columns
 from vis.page.page import Block
 from vis.page.plots import BED, GREY, INK, MODEL, STATES, Array, handle, legend_above, sheet
 from vis.page.report import Report, Result
+from vis.page.sentences import label_of
 from vis.page.states import States, state_runs
 
 __all__ = ["COLOURS", "FIGURES", "PaperRun", "in_order"]
@@ -330,7 +331,7 @@ def figure_signs(paper: PaperRun) -> Block | None:
     packed = [entry for entry in kept.get("packed", []) if entry["surface"] in surfaces]
     denser = [handle(f"{_grains_of(packed, surfaces)} at the powder's density: one bed", BED, marker="D", ls="", ms=5)]
     springs = [entry for entry in kept.get("springs", []) if entry["surface"] in surfaces]
-    thin = f"by the error of K and C, ± {springs[0]['half']:g}° (one case)" if springs else ""
+    thin = f"by the error of K and C, ± {_half(springs[0]):.0f}° (95 %, one case)" if springs else ""
     legend_above(drawing, [
         handle(f"spring-damper of {' and '.join(surfaces)}", MODEL, marker="o", ls="", ms=6),
         handle("by both ends of its friction band", MODEL, lw=3.0, alpha=0.4),
@@ -367,7 +368,7 @@ def _draw_signs(axis: Axes, paper: PaperRun, kept: Result, what: tuple[str, floa
         axis.plot([place - 0.2] * 2, np.degrees([min(band), max(band)]), color=MODEL, lw=3.0, alpha=0.4)
         axis.plot(place - 0.2, math.degrees(nominal), "o", color=MODEL, ms=5.5)
     for entry in of_this(kept.get("springs", [])):
-        axis.errorbar(place - 0.2, entry["angle"], entry["half"], fmt="none", color=MODEL, lw=1.0, capsize=3)
+        axis.errorbar(place - 0.2, entry["angle"], _half(entry), fmt="none", color=MODEL, lw=1.0, capsize=3)
     for entry in of_this(kept["one_bed"]):
         axis.plot(place, entry["angle"], "s", color=BED, mfc="none", ms=5.5)
     for entry in of_this(kept["beds"]):
@@ -376,6 +377,11 @@ def _draw_signs(axis: Axes, paper: PaperRun, kept: Result, what: tuple[str, floa
         axis.errorbar(place + 0.2, angles.mean(), half, fmt="s", color=BED, ms=5.5, capsize=3)
     for entry in of_this(kept.get("packed", [])):
         axis.plot(place + 0.33, entry["angles"][0], "D", color=BED, ms=4.5)
+
+
+def _half(spring: Result) -> float:
+    """Half of the 95 % interval of an angle on the spring-damper [degrees]; older folders have the std as half."""
+    return NORMAL * float(spring["std"] if "std" in spring else spring["half"])
 
 
 def figure_sweep(paper: PaperRun) -> Block | None:
@@ -400,7 +406,7 @@ def figure_sweep(paper: PaperRun) -> Block | None:
     }  # fmt: skip
     measures = {
         "trajectory_angle": "trajectory angle [degrees]",
-        "transition_angle_hop": "θ at the first hop [degrees]",
+        "transition_angle_hop": f"{label_of('transition_angle_hop')} [degrees]",
     }
     drawing, axes = sheet(len(paper.hard), 2, 5.2, sharey=True, sharex="col")
     for i, surface in enumerate(paper.hard):

@@ -11,10 +11,10 @@ from pathlib import Path
 
 from vis.page.page import Block, Section, Tile, table, text
 from vis.page.report import Report, Result, again, report_of
-from vis.page.sentences import Sentences
+from vis.page.sentences import Sentences, label_of
 from vis.paper.figures import FIGURES, PaperRun, in_order
 
-__all__ = ["answer_tiles", "write_paper_report"]
+__all__ = ["CASE_HEAD", "answer_tiles", "write_paper_report"]
 
 say = Sentences(__package__)
 _MEASURES = (
@@ -24,10 +24,11 @@ _MEASURES = (
     ("transition_angle_slip", 180 / math.pi),
     ("transition_angle_hop", 180 / math.pi),
 )
-_CASES = (
-    "surface", "g", "torque [N m]", "angle [degrees]", "speed [mm/s]", "dθ/dt [rad/s]", "first slip [degrees]",
-    "first hop [degrees]",
+CASE_HEAD = (
+    "surface", "g", "torque [N m]", "angle [degrees]", "speed [mm/s]", "dθ/dt [rad/s]",
+    *(f"{label_of(name)} [degrees]" for name in ("transition_angle_slip", "transition_angle_hop")),
 )  # fmt: skip
+"""Columns of the table of every case."""
 _CLAIMS = ("in the paper's words", "compared", "stated", "ours", "met", "judged by, and why")
 _RISEN = "with a torque that rises"
 
@@ -52,7 +53,7 @@ def write_paper_report(report: Report) -> Path:
         *_evidence_section(result, blocks.pop("evidence", None)),
         Section("The figures", list(blocks.values())),
         Section("Numbers that the paper does not state", [*swept, *_sliding_blocks(paper), *_grains_blocks(paper)]),
-        Section("Every case", [table(_CASES, numbers), text(small, small=True)]),
+        Section("Every case", [table(CASE_HEAD, numbers), text(small, small=True)]),
         Section("Inputs", [text(f"{_platform(result)} {_ours(result)}"), given]),
         again("hedgebed paper run.toml", ""),
     ]

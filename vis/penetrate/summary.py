@@ -29,10 +29,10 @@ REAL_GRAINS = {"sand": 2e-4, "sand-weak": 2e-4}
 def summarise(run: RunFolder) -> dict[str, Any]:
     """The whole content of the report but its images.
 
-    Returns a dict with "title", "status", "banner", "lead" (facts under the title), "tiles", "answers", "rest"
-    (what a foot that does not come to rest needs), "body" (what it is called), "similarity", "fit", "departures",
-    "reference", "bed", "spike", "runs", "numbers", "settings", "warnings", "missing", "frames" and "reproduce";
-    "caveat" is what to know before any number.
+    Returns a dict. Its head has "title", "status", "banner", "lead" (facts under the title) and "caveat" (what to know
+    before any number). The answer has "tiles", "answers", "rest" (what a foot that does not come to rest needs) and
+    "body" (what it is called). Then follow "similarity", "fit", "departures", "reference", "bed", "spike", "runs",
+    "numbers", "settings", "warnings", "missing", "frames" and "reproduce".
     """
     result = run.result
     quantities, spike = words.mapping_of(result.get("quantities")), dict(words.mapping_of(result.get("spike")))

@@ -1,7 +1,7 @@
 """The page around a picture of the bed: title, colour bar, depth scale. The same with OpenGL and without.
 
 A picture is 4:3. The three-dimensional image, or the cross-section that stands in for it, fills the page to the left of
-the colour bar; `place` maps points of the bed onto it, (n, 3) [m] -> (n, 2), in fractions of the page from its lower
+the colour bar. `place` maps points of the bed onto it, (n, 3) [m] -> (n, 2), in fractions of the page from its lower
 left corner.
 """
 

@@ -5,6 +5,7 @@
     frames/driven-0.1-seed1_spike_0000.vtu    a body as a triangle mesh in place
     frames/tumble_row_forces_0000.vtu         points with vectors, for glyphs
     frames/tumble_surface_0000.vti            a height map: warped by its `height`, it lies where the grains' tops are
+    frames/robot_grains_at_123000000.vtu      the one frame of a moment of its own, here 0.123 s
 
 The default name, "frames", has no prefix: `frames/frames.pvd`, `frames/grains_0000.vtu`. Reals are float32, blocks are
 zlib-compressed, in base64. Every file is written beside its place and moved there, the PVD last, so a run that is
@@ -45,6 +46,7 @@ BODIES = ("robot", "tumble")
 """Frames of a robot and of a platform. Older run folders have those of a robot as `tumble`."""
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+-]*\Z")
 _DIGESTS = "Digests"
+_OWN = re.compile(r"_at_\d+\.vt[ui]\Z")  # End of the files of a frame of a moment of its own
 Body = tuple[ArrayLike, ArrayLike]
 Cloud = tuple[ArrayLike, Mapping[str, ArrayLike]]
 Points = NDArray[np.float32]
@@ -116,15 +118,17 @@ class FrameWriter:
         values: Mapping[str, float] | None = None,
         clouds: Mapping[str, Cloud] | None = None,
         maps: Mapping[str, HeightMap] | None = None,
+        own_moment: bool = False,
     ) -> Path:
         """Write one frame.
 
-        ``time``: Time [s], on the clock of the run's series, not before the last frame; a frame at the last frame's
+        ``time``: Time [s], on the clock of the run's series, not before the last frame. A frame at the last frame's
         time takes its place (a run resumed from a checkpoint may write that frame again). ``grains``: `position` [m],
         shape (n, 3), and any of `GRAIN_FIELDS`; a vector field may be given as its magnitude, shape (n,). ``bodies``:
         Name -> (points [m], shape (n, 3), triangles, shape (m, 3)). ``values``: Scalars of this frame, such as depth
         [m] and force [N]. ``clouds``: Name -> (points [m], shape (n, 3), fields), a field of shape (n,) or (n, 3): what
-        glyphs are of. ``maps``: Name -> height map. Returns the PVD file. Raises ValueError: a time before the last
+        glyphs are of. ``maps``: Name -> height map. ``own_moment``: Whether it takes the place of the last such frame.
+        A run has one beside those at even times. Returns the PVD file. Raises ValueError: a time before the last
         frame's, arrays of unequal length or wrong shape, values that are not finite, an unknown grain field.
         """
         time = float(time)
@@ -134,7 +138,10 @@ class FrameWriter:
             raise ValueError(f"time is {time!r}; it must be finite and not before the last frame's, {last!r}")
         scalars = {"TimeValue": time, **{key: float(value) for key, value in (values or {}).items()}}
         before = [entry for entry in self._entries if not again or entry.time != last]
-        index = len({entry.time for entry in before})
+        if own_moment:
+            before = [entry for entry in before if not _OWN.search(entry.file)]
+        even = len({entry.time for entry in before if not _OWN.search(entry.file)})
+        index = f"at_{round(1e9 * time):09d}" if own_moment else f"{even:04d}"
         parts: list[_Part] = [("grains", *_grain_arrays(grains), None)]
         for body, (points, triangles) in (bodies or {}).items():
             parts.append((body, *_body_arrays(body, points, triangles)))
@@ -145,15 +152,18 @@ class FrameWriter:
                 raise ValueError(f"a part is named {key!r}; letters, digits and . _ + - only, and not 'grains'")
         fresh = []
         for part, (name, positions, fields, faces) in enumerate(parts):
-            file = f"{self._prefix}{name}_{index:04d}.vtu"
+            file = f"{self._prefix}{name}_{index}.vtu"
             _write_vtu(self.folder / file, positions, fields, faces, scalars)
             fresh.append(_Entry(time, part, name, file, digest_of(self.folder / file)))
         for name, grid in (maps or {}).items():
-            file = f"{self._prefix}{name}_{index:04d}.vti"
+            file = f"{self._prefix}{name}_{index}.vti"
             _write_vti(self.folder / file, name, grid, scalars)
             fresh.append(_Entry(time, len(fresh), name, file, digest_of(self.folder / file)))
+        gone = {entry.file for entry in self._entries} - {entry.file for entry in before + fresh}
         self._entries = before + fresh
         self._write_pvd()
+        for file in gone:
+            (self.folder / file).unlink(missing_ok=True)
         return self.path
 
     def _write_pvd(self) -> None:

@@ -32,8 +32,9 @@ def spike_profile(
     ``tip``: "sphere", "cone" or "flat". ``diameter``: Diameter of the tip [m]. ``length``: From the tip's lowest point
     to the shaft's upper end [m]. ``shaft_diameter``: Diameter of the shaft [m], at most the tip's; None: as the tip.
     ``cone_angle``: Full angle of a conical tip [degrees]. ``segments``: Segments of a full circle. Returns radius and
-    height [m], shape (k, 2). Raises ValueError: an unknown tip, a size that is not positive, a shaft thicker than the
-    tip or thinner than a flat one, an angle out of range, a length within the tip, fewer than 3 segments.
+    height [m], shape (k, 2). Raises ValueError: an unknown tip, a size that is not positive, an angle out of range, a
+    length within the tip, fewer than 3 segments. The shaft may not be thicker than the tip, nor thinner than a flat
+    one.
     """
     shaft_diameter = diameter if shaft_diameter is None else shaft_diameter
     for name, value in (("diameter", diameter), ("shaft_diameter", shaft_diameter), ("length", length)):
@@ -72,9 +73,9 @@ def spike_profile(
 def revolve(profile: ArrayLike, *, segments: int = 72) -> Mesh:
     """Closed surface of revolution of an outline about +z.
 
-    ``profile``: Radius and height [m], shape (k, 2), from the lowest point on the axis to the highest one on the axis;
-    only the two ends lie on the axis. ``segments``: Segments of a full circle. Raises ValueError: an outline of another
-    shape, one that does not start and end on the axis, or touches it between.
+    ``profile``: Radius and height [m], shape (k, 2), from the lowest point to the highest one; only these two ends lie
+    on the axis. ``segments``: Segments of a full circle. Raises ValueError: an outline of another shape, one that does
+    not start and end on the axis, or touches it between.
     """
     outline = np.asarray(profile, dtype=np.float64)
     if outline.ndim != 2 or outline.shape[1] != 2 or len(outline) < 3:
@@ -128,9 +129,9 @@ def mesh_volume(points: ArrayLike, triangles: ArrayLike) -> float:
 def shape_mesh(shape: Any, *, segments: int = 72) -> Mesh:
     """Surface of a shape that grains touch, or of several, in the body's frame; where several overlap, both are shown.
 
-    ``shape``: What `Bed.add_body` takes: an object that is called Ball, Box, Capsule, Cone, Cylinder, Mesh, Placed,
-    Polyhedron or Tube and has the sizes [m] of `dem`'s shape of that name, or a sequence of such. ``segments``:
-    Segments of a full circle. Raises ValueError: another shape (a Plane has no end), no shape at all.
+    ``shape``: What `Bed.add_body` takes, one or a sequence. An object is called Ball, Box, Capsule, Cone, Cylinder,
+    Mesh, Placed, Polyhedron or Tube, and has the sizes [m] of `dem`'s shape of that name. ``segments``: Segments of a
+    full circle. Raises ValueError: another shape (a Plane has no end), no shape at all.
     """
     if isinstance(shape, (list, tuple)):
         if not shape:

@@ -1,7 +1,7 @@
 """Scenes rendered off screen with VTK. Needs OpenGL: use them only in a process that may die.
 
 Grains are exact spheres by ray casting in the shader (a quad per grain, not a mesh): software OpenGL draws 20,000 of
-them in about a second. `Scene` is the bed cut open in front of a camera that stands still; `Stage` is a platform on its
+them in about a second. `Scene` is the bed cut open in front of a camera that stands still. `Stage` is a platform on its
 ground through a camera that can be moved. The projection is parallel: a length is the same all over the picture, and
 scales are square to its edges. The view goes along +y, from a little above, onto the plane of the cut. `place` says
 where points lie on the picture, for what is drawn over it.

@@ -21,9 +21,9 @@ NEAR = 1.1
 def lying(position: ArrayLike, radius: ArrayLike) -> NDArray[np.bool_]:
     """Which grains belong to the bed, and not to what flies over it or hangs on a spike.
 
-    The lower three quarters of the grains do; above them those that a chain of neighbours, a tenth of a diameter apart
-    at most, joins to these. So a string of grains up a standing spike is joined to the bed too. It remains a tower in
-    the height map.
+    The lower three quarters of the grains do. Above them those belong that a chain of neighbours, a tenth of a diameter
+    apart at most, joins to these. So a string of grains up a standing spike is joined to the bed too. It remains a
+    tower in the height map.
 
     ``position``: Centres of the grains [m], shape (n, 3). radius: Their radii [m], shape (n,). Returns shape (n,).
     """

@@ -30,8 +30,8 @@ def answer_tiles(result: Mapping[str, Any]) -> list[Tile]:
     """Rows of the table at the top of a report, each with its errors in words.
 
     Of chance: half of the 95 % interval over several beds, "one bed" on one, and on a law the range that its numbers
-    leave open. Of grain size: a law has none. The third is the range over the laws of sand, on grains with them; where
-    there are no laws on grains it is of bed, softness and speed, which no run of a robot has.
+    leave open. Of grain size: a law has none. The third is the range over the laws of sand, on grains with them. Where
+    there are no laws beside grains it is of bed, softness and speed, which no run of a robot has.
     """
     quantities, sure, several = result["quantities"], result.get("sure") or {}, "beds" in result
     on_grains = several or "grains" in result or result.get("ground") == "bed"

@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigid.series import read_series
-from vis.page.numbers import column, typeset
+from vis.page.numbers import scale_of, typeset
 from vis.page.page import Block, Section, Tile, text
 from vis.page.plots import BED, GREY, MODEL, handle, legend_above, new_panels, shades
 from vis.page.report import Report, Result, again, capital, report_of, tables
 from vis.page.sentences import label_of
 
-__all__ = ["answer_tiles", "write_sweep_report"]
+__all__ = ["answer_tiles", "on_axis", "write_sweep_report"]
 
 MOST_DRAWN = 8
 """Quantities that have a figure."""
@@ -52,7 +52,7 @@ def answer_tiles(result: Result) -> list[Tile]:
 
 def _over(report: Report, table: Mapping[str, NDArray], entry: Result) -> Block:
     """One quantity over each factor, coloured by the factor of fewest values."""
-    factors, (values, label) = report.result["factors"], _on_axis(table[entry["head"]], entry, entry["name"])
+    factors, (values, label) = report.result["factors"], on_axis(table[entry["head"]], entry, entry["name"])
     counts = {factor["key"]: len(np.unique(table[factor["key"]])) for factor in factors}
     by = min(counts, key=lambda key: counts[key]) if len(factors) > 1 else ""
     if by and counts[by] > _MOST_COLOURS:
@@ -61,7 +61,7 @@ def _over(report: Report, table: Mapping[str, NDArray], entry: Result) -> Block:
     colours = shades(len(groups)) if by else [BED]
     drawing, axes = new_panels(len(factors), height=2.8, sharey=True)
     for axis, factor in zip(axes, factors, strict=True):
-        x, under = _on_axis(table[factor["key"]], factor, factor["key"])
+        x, under = on_axis(table[factor["key"]], factor, factor["key"])
         for group, colour in zip(groups, colours, strict=True):
             own = np.ones(len(x), bool) if group is None else table[by] == group
             axis.plot(x[own], values[own], color=colour, marker="o", ms=4, ls="")
@@ -71,7 +71,7 @@ def _over(report: Report, table: Mapping[str, NDArray], entry: Result) -> Block:
     axes[0].set_ylabel(fill(label, _WIDTH))
     varied: Result = next((factor for factor in factors if factor["key"] == by), {})
     if by:
-        shown, under = _on_axis(np.array(groups), varied, by)
+        shown, under = on_axis(np.array(groups), varied, by)
         marks = [handle(f"{under}: {_plain(one)}", colour, marker="o", ls="")
                  for one, colour in zip(shown.tolist(), colours, strict=True)]  # fmt: skip
         legend_above(drawing, marks)
@@ -86,19 +86,13 @@ def _words(entry: Result, name: str) -> str:
     return str(entry.get("words") or label_of(name))
 
 
-def _on_axis(values: NDArray, entry: Result, name: str) -> tuple[NDArray, str]:
+def on_axis(values: NDArray, entry: Result, name: str) -> tuple[NDArray, str]:
     """Numbers of a quantity or a setting in the unit of other reports (mm, degrees), and their label with that unit."""
-    unit = str(entry["unit"] or "1")
-    if unit == "rad":
-        values, unit = np.degrees(values), "degrees"
+    shown = ""
     if values.dtype.kind in "fiu":
-        known = np.abs(values[np.isfinite(values)])
-        largest = float(known.max(initial=0.0))
-        shown = column([largest], unit)[0]
-        if unit == "m" and shown == "mm":
-            values = 1e3 * values
-        unit = shown if unit in ("m", "m/s2") else unit
-    return values, f"{_words(entry, name)}{f' [{typeset(unit)}]' if unit != '1' else ''}"
+        scale, shown = scale_of(values.tolist(), str(entry["unit"] or "1"))
+        values = values / scale if scale != 1.0 else values
+    return values, f"{_words(entry, name)}{f' [{typeset(shown)}]' if shown else ''}"
 
 
 def _plain(value: Any) -> str:

@@ -7,6 +7,7 @@ from typing import Any
 
 from vis.page.law_rows import answer_rows, cell_of
 from vis.page.page import Tile
+from vis.page.sentences import label_of
 
 __all__ = ["answer_tiles"]
 
@@ -14,8 +15,8 @@ _ROWS = {
     "trajectory_angle": ("Trajectory angle", "of the first 10 mm"),
     "max_speed": ("Largest speed", "of the centre"),
     "max_angular_velocity": ("Largest angular velocity", ""),
-    "transition_angle_slip": ("Slips from", "θ at the first slip"),
-    "transition_angle_hop": ("Hops from", "θ at the first hop"),
+    "transition_angle_slip": (label_of("transition_angle_slip"), ""),
+    "transition_angle_hop": (label_of("transition_angle_hop"), ""),
     "sinkage_largest": ("Largest sinkage", "of any row"),
 }
 """Number of the result -> its label and note."""

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from vis.page.numbers import short
+from vis.page.sentences import label_of
 
 __all__ = ["HEAD", "beside_rows", "beside_words"]
 
@@ -16,8 +17,8 @@ _ROWS = (
     ("trajectory_angle", "trajectory angle", 180 / math.pi, "°"),
     ("max_speed", "largest speed", 1.0, " m/s"),
     ("max_angular_velocity", "largest dθ/dt", 1.0, " rad/s"),
-    ("transition_angle_slip", "slips from", 180 / math.pi, "°"),
-    ("transition_angle_hop", "hops from", 180 / math.pi, "°"),
+    ("transition_angle_slip", label_of("transition_angle_slip"), 180 / math.pi, "°"),
+    ("transition_angle_hop", label_of("transition_angle_hop"), 180 / math.pi, "°"),
     ("sinkage_start", "sinkage as the torque begins", 1e3, " mm"),
     ("sinkage_largest", "sinkage of the deepest row", 1e3, " mm"),
 )

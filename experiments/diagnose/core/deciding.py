@@ -86,8 +86,9 @@ def values_of_all(found: Fit, held_out: tuple[str, ...]) -> dict[str, float]:
 def verdict_of(
     choice: Choice, held: Verdict | None, held_out: tuple[str, ...], seed: int, *, set_aside: bool = False
 ) -> str:
-    """``named`` or ``ambiguous`` where the best model leaves nothing, on the trials fitted and held out, or too little,
-    or a misfit of form; and where it needs no number that the campaign all but excludes. Else ``unknown``."""
+    """``named``, ``ambiguous`` or else ``unknown``. The first two need a best model that leaves nothing on the trials
+    fitted and held out, or too little, or a misfit of form. It must also need no number that the campaign all but
+    excludes."""
     found = choice.best.fit
     if not choice.best.effects or is_strained(found) or bends_little_away(found, choice.base.fit):
         return "unknown"

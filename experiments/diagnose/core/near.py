@@ -58,7 +58,7 @@ def nearest_each(found: Diagnosis) -> tuple[Near, ...]:
 
 def near_models(found: Diagnosis, nearest: Sequence[Near]) -> dict[tuple[str, ...], Diagnosis]:
     """Other answers in the place of the best: effects -> the diagnosis with that fit. Of an ambiguous one those that
-    trials cannot distinguish; of a named one the `nearest` that are less than `LEAD` behind, by evidence and by
+    trials cannot distinguish. Of a named one the `nearest` that are less than `LEAD` behind, by evidence and by
     prediction."""
     if found.choice is None:
         return {}

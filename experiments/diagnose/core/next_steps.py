@@ -1,8 +1,8 @@
 """What to do next where something unknown is missing: repeat the worst trial, or, where it has replicates, follow up
 what the missing force correlates with.
 
-What is left of one replicate and comes back in the others is in the body or its ground; the rest differs
-from trial to trial, by its cause or because the fit found a wrong branch.
+What is left of one replicate and returns in the others is in the body or its ground. The rest differs from trial to
+trial, by its cause or because the fit found a wrong branch.
 """
 
 import math

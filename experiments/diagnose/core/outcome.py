@@ -205,8 +205,9 @@ class Diagnosis(Known):
 
     @cached_property
     def known_scatter(self) -> dict[str, float] | None:
-        """By what trials of one condition differ beyond the sensors, by kind, with the number of `trials` and the
-        degrees of `freedom` it was found from; None where no trial repeats another and none was found without."""
+        """By what trials of one condition differ beyond the sensors, by kind. Beside it stand the number of `trials`
+        and the degrees of `freedom` that it was found from. None where no trial repeats another and none was found
+        without."""
         used = [trial for trial in self.problem.trials if trial.id in (*self.fitted, *self.held_out)]
         groups = [len(ids) for ids in groups_of(used).values() if len(ids) > 1]
         if not (groups or self.model_std):

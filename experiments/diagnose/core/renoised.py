@@ -79,8 +79,8 @@ def recoloured(found: Fit, colours: Mapping[str, Colour]) -> Fit:
 
 
 def colours_of(found: Fit) -> dict[str, Colour]:
-    """Colours of the noise, where the misfit is small enough for the fast modes to hold nothing else; where it is not,
-    the level of the noise, if it is there all the time."""
+    """Colours of the noise, where the misfit is so small that the fast modes hold nothing else. Elsewhere the level of
+    the noise, if it is there all the time."""
     white: dict[str, Colour] = {}
     if found.chi_square > _MOST_FOR_COLOUR * found.count:
         white = find_white_noise(found)

@@ -2,17 +2,17 @@
 
 The signature of an effect is the change that it makes in the predicted data where it is fitted, over the noise. The
 part that the other parameters could take up is subtracted. The angle between two signatures says whether the design
-sees them as one, whatever the noise was in these trials; their distance, how many standard deviations of noise lie
+sees them as one, whatever the noise was in these trials. Their distance says how many standard deviations of noise lie
 between the two predictions. Half its square is the evidence that can be expected [nats], less where the misfit of form
 exceeds the noise.
 
-In the cross-validation every condition (torque and gravity of a tumble; kind, speed and diameter of a penetration) is
-left out in turn, and the model refitted to the others. The trials left out are then predicted; only their own nuisances
-are refitted, within their priors; a base parameter of which the others say nothing (K of a diameter) stays as all
-trials have it. What a prediction leaves is scored as a fit is (`evidence.tempered`): the form is never nature's. Where
-motions are smooth in the parameters (pushes and drops), the fitted numbers count with their standard errors. This is a
-predictive likelihood to first order in the errors (Gelman et al., Bayesian Data Analysis, 3rd ed., section 7.2): a drop
-that is sensitive to a number that the others determine badly is no evidence against a model.
+In the cross-validation every condition is left out in turn, and the model refitted to the others. A condition is torque
+and gravity of a tumble; kind, speed and diameter of a penetration. The trials left out are then predicted; only their
+own nuisances are refitted, within their priors. A base parameter of which the others say nothing (K of a diameter)
+stays as all trials have it. What a prediction leaves is scored as a fit is (`evidence.tempered`): the form is never
+nature's. Where motions are smooth in the parameters (pushes and drops), the fitted numbers count with their standard
+errors. This is a predictive likelihood to first order in the errors (Gelman et al., Bayesian Data Analysis, 3rd ed.,
+section 7.2): a drop that is sensitive to a number that the others determine badly is no evidence against a model.
 """
 
 import math

@@ -33,8 +33,9 @@ def as_contract(found: Diagnosis) -> Diagnosis:
     """`found`, or in place of a `none` whose readings are noisier than stated an `unknown` without an effect.
 
     The readings are noisier where fitted and held-out trials both leave more than 1.2 with the scatter of replicates
-    counted as noise; or where they leave it without that scatter and a sensor is more than twice as noisy. If only
-    held-out trials leave more, it decides nothing: a tumble may diverge late. Times that jitter are the clock's noise.
+    counted as noise. They are noisier too where both leave it without that scatter and a sensor is more than twice as
+    noisy. If only held-out trials leave more, it decides nothing: a tumble may diverge late. Times that jitter are the
+    clock's noise.
     """
     return replace(found, verdict="unknown") if _too_noisy(found) else found
 

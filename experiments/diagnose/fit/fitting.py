@@ -1,6 +1,6 @@
 """Fits: the maximum of likelihood times priors, by a damped Gauss-Newton method over all trials at once.
 
-Steps are found from the normal equations, several dampings and lengths are tried at once, and the best is taken; a
+Steps are found from the normal equations. Several dampings and lengths are tried at once, and the best is taken. A
 `Rule` says which, and when a fit ends. `SEARCH` is the rule for motions with contacts, whose likelihood jumps where a
 trial changes its branch (sticks or slips, touches or misses): such a fit may use growing shares of the trials' time. It
 scans each trial's own numbers over their priors for the measured branch. A fit is a generator that asks for modes at a
@@ -286,8 +286,8 @@ def scanned(found: Fit, *, passes: int = _PASSES) -> Fit:
 def by_beginnings(found: Fit) -> Fit:
     """The better of `found` and a fit that begins with the beginning of all trials and looks at more of them in steps.
 
-    A motion that slips, hops and falls is the rougher in its parameters the longer it goes on; a fit to all of it at
-    once may end on a branch that nobody measured.
+    A motion that slips, hops and falls is the rougher in its parameters the longer it lasts. A fit to all of it at once
+    may end on a branch that nobody measured.
     """
     model, values = found.model, {p.name: p.value for p in found.model.parameters}
     for share in _BEGINNINGS:

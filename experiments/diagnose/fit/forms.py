@@ -2,11 +2,11 @@
 
 Such a file has the shape of those in `rigid.terms`. TERM is a term as `rigid.terms` has them; the first parameter is
 the amplitude. What a diagnosis must know of it is either CANDIDATE, as the shipped effects have it
-(`rigid.terms.candidate`), or, shorter, FIT: for each parameter `typical`, a size that can be seen, from which fits
-begin; of the amplitude also `off`, the value that changes nothing (the default if left out). With FIT, tumbles take
-every hook but those of a coordinate of its own. Penetration takes `stiffen`, `rate_force` and `hold`, with depth, rate
-and deepest depth of the spike, and of `s` what a spike that goes straight down has: mass, gravity, weight, y = -depth
-and vy.
+(`rigid.terms.candidate`), or, shorter, FIT. FIT has for each parameter `typical`, a size that can be seen, from which
+fits begin. Of the amplitude it has also `off`, the value that changes nothing (the default if left out). With FIT,
+tumbles take every hook but those of a coordinate of its own. Penetration takes `stiffen`, `rate_force` and `hold`, with
+depth, rate and deepest depth of the spike, and of `s` what a spike that goes straight down has: mass, gravity, weight,
+y = -depth and vy.
 """
 
 import math
@@ -49,9 +49,9 @@ def plain_form(effect: str, form: declared.Form, bends: Sequence[declared.Bend])
 def shapes_of(forms: Sequence[Form], *, again: bool = False) -> dict[str, tuple[Form, ...]]:
     """The forms that can be bent, with the numbers that bend them: id of the plain form -> the bent ones.
 
-    A bent form is no candidate of its own. It is fitted only after the plain form has been, from there, with its
-    numbers beginning at what changes nothing; so it costs little, and a name is found by the plain form. `again`: a
-    bent form may be bent by what comes after its bend.
+    A bent form is no candidate of its own. It is fitted only after the plain form, from there, and its own numbers
+    begin at what changes nothing. So it costs little, and a name is found by the plain form. `again`: a bent form may
+    be bent by what comes after its bend.
     """
     found = {form.id: tuple(_bent(form, place) for place in range(len(form.bends))) for form in forms if form.bends}
     for bent in list(found.values()) if again else ():

@@ -2,7 +2,7 @@
 
 The null is made by bootstrap: white noise in the modes (and in the priors: the true parameters differ from the stated
 ones) with what a refit would take out of it taken out. Near the best fit a refit is a projection on the fit's Jacobian,
-so that a thousand refits cost one; `thorough` makes new data and refits in full instead, for models whose contacts make
+so that a thousand refits cost one. Instead `thorough` makes new data and refits in full, for models whose contacts make
 a likelihood rough. No table of a distribution is used, but for the tails, where a gamma law of the bootstrap's own mean
 and variance stands in.
 

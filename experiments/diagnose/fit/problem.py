@@ -309,8 +309,9 @@ class Problem(Protocol):
         return ()
 
     def latent(self, values: Values, forms: Sequence[Form], trial: str) -> dict[str, Array]:
-        """Columns of latent.csv: ``t_s`` first, then ``latent_...`` (the force, torque or error of a sensor that the
-        model misses, by time), then what it might depend on (``depth_m``, ``velocity_m_s``, ...); all of one shape."""
+        """Columns of latent.csv, all of one shape. ``t_s`` is first. Then come ``latent_...`` (the force, torque or
+        error of a sensor that the model misses, by time), and what it might depend on (``depth_m``, ``velocity_m_s``,
+        ...)."""
 
     def compare(self, values: Values, forms: Sequence[Form], trial: str) -> dict[str, dict[str, Array]]:
         """Channel -> {"t_s", "measured", "model"} for plots, at the samples; units those of the channel."""

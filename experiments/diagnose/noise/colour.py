@@ -57,8 +57,8 @@ def find_colours(found: Fit) -> dict[str, Colour]:
 
 
 def colour_of(channel: str, residuals: Sequence[Array]) -> Colour | None:
-    """The colour of one channel's noise from what smooth curves leave of it, an array a recording, over the stated
-    noise; None where the noise is as stated."""
+    """The colour of one channel's noise; None where the noise is as stated. ``residuals``: what smooth curves leave of
+    it over the stated noise, an array a recording."""
     return _fitted(channel, [dct(rest, norm="ortho") for rest in residuals], residuals) if residuals else None
 
 

@@ -2,10 +2,10 @@
 
 Where a tip is only just caught, or only just touches, the smallest thing decides how a trial continues: two integrators
 diverge there, and so do a model and nature. What follows does not show what the model omits, but would be most of what
-it leaves. Such a trial is set aside, with a finding, only as the last resort: where nothing else explains the campaign;
-where one model passes the gate on all the others, fitted and held out; and where it follows this trial, too, for a good
-part of its time. Few may be: what shows in one trial of six is hardly an effect, what shows in two is. Beside an effect
-that the others call for, one of the trials that were fitted and one of those held out may.
+it leaves. Such a trial is set aside, with a finding, only as the last resort, where nothing else explains the campaign.
+One model must pass the gate on all the others, fitted and held out. It must follow this trial, too, for a good part of
+its time. Few may be: what shows in one trial of six is hardly an effect, what shows in two is. Beside an effect that
+the others call for, one of the trials that were fitted and one of those held out may.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -79,7 +79,7 @@ def diverging_held_out(
     found: Fit, held_out: Sequence[str], values: Mapping[str, float], most: int, *, seed: int = 0, enough: float = 0.0,
     share: float = 0.0,
 ) -> tuple[str, ...] | None:  # fmt: skip
-    """Those held-out trials, `most` at most, that the model follows at first only, all others passing the gate; None
+    """Those held-out trials, `most` at most, that the model follows at first only, while all others pass the gate. None
     where more fail, or fail from the start. `enough`: chi-square per sample up to which trials pass in any case.
     `share`: of its time up to which each must be followed."""
     problem = found.model.problem

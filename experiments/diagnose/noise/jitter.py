@@ -5,8 +5,8 @@ and as large as the signal is steep, which other noise is not. Both are found fr
 (weights b = 1, -2, 1, in which motion leaves little): their variance is
 a^2 sum b^2 + sigma^2 sum (b dy/dt)^2, the noise a free in each channel, sigma one number for all sensors on a clock.
 Fourth differences, in which motion leaves next to nothing, must show the same sigma.
-In the likelihood a row's readings then have the covariance s s' + their noise's, s = sigma dy/dt over the noise, which
-a recording whose readings share rows sees as one error, not as several.
+In the likelihood a row's readings then have the covariance s s' + their noise's, s = sigma dy/dt over the noise. So
+readings that share a row have one common error, not several.
 """
 
 from __future__ import annotations

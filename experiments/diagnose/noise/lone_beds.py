@@ -1,12 +1,11 @@
 """Beds that differ although no trial repeats another.
 
-Replicates show what differs between beds without any model. Where each trial has a condition of its own, a separate
-factor on the bed for each trial may represent anything that changes with the condition. So it counts only where all of
-these
-hold: the factors scatter beyond their errors, and not for one trial alone; with them every trial is explained from its
-first row to its last (the gate passes, which examines the shape within each trial); and they correlate with nothing by
-which trials differ, neither speed, gravity and kind of trial nor the campaign's order. What correlates with one of
-these is an effect, or a drift, and becomes a finding instead.
+Replicates show what differs between beds without any model. Where each trial has a condition of its own, separate
+factors on the beds of trials may represent anything that changes with the condition. So it counts only where three
+conditions hold. The factors scatter beyond their errors, and not for one trial alone. With them every trial is
+explained from its first row to its last: the gate passes, which examines the shape within each trial. They correlate
+with nothing by which trials differ, neither speed, gravity and kind of trial nor the campaign's order. What correlates
+with one of these is an effect, or a drift, and becomes a finding instead.
 """
 
 from collections.abc import Mapping, Sequence

@@ -130,7 +130,7 @@ def find_scatter(
     """Random effects between replicates: nuisances, their priors estimated, and what is written as model_std.
 
     Each trial's own numbers (bed, friction, whatever the problem offers) are fitted, all kinds at once, so that none
-    replaces another; within a condition these must agree within their errors. What the model omits is the same for all
+    replaces another. Within a condition these must agree within their errors. What the model omits is the same for all
     replicates while it is small. Where it is large, it changes each trial's factors differently. Errors then are those
     of noise as large as the residual (`inflation`) or, `apart`, as each trial's own residual (`_own_noise`), and all
     kinds are examined. The scatter is the most likely one beside these errors, each condition's mean taken out

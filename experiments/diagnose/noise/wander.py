@@ -3,8 +3,8 @@
 Grains jam and yield otherwise in each bed, so curves of one condition wander apart slowly. What a law of the mean
 bed must explain is what replicates have in common. The size of the wander is the pure error of a lack-of-fit test
 (Draper and Smith, Applied Regression Analysis, 3rd ed. 1998, section 2.1), taken mode by mode. Mode k of a channel has
-the variance 1 + A / (1 + (k / b)^p) in units of the noise, b and p of the channel, A of the condition (Whittle's
-likelihood of the differences within conditions); a condition without replicates has the median A.
+the variance 1 + A / (1 + (k / b)^p) in units of the noise. b and p are of the channel, A of the condition (Whittle's
+likelihood of the differences within conditions). A condition without replicates has the median A.
 """
 
 from __future__ import annotations

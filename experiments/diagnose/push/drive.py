@@ -1,10 +1,10 @@
 """The motion of a drive: levels of constant speed joined by ramps, at times that the depth column shows.
 
-A machine that pushes a spike moves at a speed, holds, and comes back; between two speeds it takes some time, during
-which the speed changes in proportion to time or as a raised cosine. Depth is then z0 + sum of L_k (time at level k),
-linear in the levels L_k. The ramps' middles and widths are found with them by damped least squares (Marquardt, J. SIAM
-11 (1963), 431). Ramps are added where they reduce the misfit most, while the Bayesian information criterion falls. By
-the same rule levels are set to rest and needless ramps removed.
+A machine that pushes a spike moves at a speed, holds, and returns. Between two speeds it takes some time, during which
+the speed changes in proportion to time or as a raised cosine. Depth is then z0 + sum of L_k (time at level k), linear
+in the levels L_k. The ramps' middles and widths are found with them by damped least squares (Marquardt, J. SIAM 11
+(1963), 431). Ramps are added where they reduce the misfit most, while the Bayesian information criterion falls. By the
+same rule levels are set to rest and needless ramps removed.
 """
 
 from __future__ import annotations

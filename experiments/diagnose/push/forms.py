@@ -1,8 +1,8 @@
 """The candidates of a campaign of spikes that move straight down: the forms that the files of effects declare.
 
 Amplitudes are in units of the campaign: forces in K D (stiffness times the depth D typical of the trials), so that
-one scale serves grains and clay. Where trials have several diameters d, forces on a section go with d^2, on a shaft
-with d, and what belongs to the bed's spring with that diameter's own K; this is what ties the diameters together.
+one scale serves grains and clay. Where trials have several diameters d, forces on a section are proportional to d^2, on
+a shaft to d. Those of the bed's spring are proportional to that diameter's own K. This connects the diameters.
 """
 
 import math
@@ -54,9 +54,9 @@ def physical(slot: Number, value: float, scales: Scales, *, stiffness: float, si
     """What the law's slot gets: `stiffness` [N/m] is this diameter's K, `size` its diameter over the campaign's.
 
     How it follows from the value (`Number.how`): ``plain``, ``depth`` (D e^value), ``speed`` (V e^value), ``time``
-    (e^value s), ``spring`` (K, of this diameter), ``spring force`` (K D, of this diameter), ``area`` (force by d^2),
-    ``drag`` (force over speed^2 by d^2), ``perimeter`` (force by d), ``viscous`` (force over speed by d), ``same`` and
-    ``change`` (of a term from a file: in its own unit).
+    (e^value s), ``spring`` (K, of this diameter) and ``spring force`` (K D, of this diameter). By the diameter change
+    ``area`` (force by d^2), ``drag`` (force over speed^2 by d^2), ``perimeter`` (force by d) and ``viscous`` (force
+    over speed by d). Of a term from a file ``same`` and ``change`` are in its own unit.
     """
     if slot.how in ("plain", "same"):
         return value

@@ -1,19 +1,19 @@
 """The force of a bed on a spike that goes straight down, with every effect of the library, compiled by Taichi.
 
 Base: F = K z + C max(0, v) for depth z > 0, and 0 above; v = dz/dt, downwards positive; F positive upwards. A drop
-obeys m z'' = m g - F. Each effect adds to one of three parts: the loading curve h(z), which is K z in the base model;
-the unloading (`top` is the deepest depth since it last entered, `deepest` the deepest ever); or the part that depends
-on the rate. The effects' own files say how (`rigid.terms.candidate.Push`), and the sum over them is written out as
-text. At amplitude 0 an effect changes nothing. `SLOTS` names the numbers of a lane; D is `reference`, a depth typical
-of the campaign, so that amplitudes of one effect's forms compare.
+obeys m z'' = m g - F. Each effect adds to one of three parts. The first is the loading curve h(z), which is K z in the
+base model. The second is the unloading (`top` is the deepest depth since it last entered, `deepest` the deepest ever).
+The third depends on the rate. The effects' own files say how (`rigid.terms.candidate.Push`), and the sum over them is
+written out as text. At amplitude 0 an effect changes nothing. `SLOTS` names the numbers of a lane; D is `reference`, a
+depth typical of the campaign, so that amplitudes of one effect's forms compare.
 
 A drop is integrated by the classical Runge-Kutta method. Each step is cut where the spike turns, leaves or comes back
 (found by halving), since friction and damper jump there. At a turning point the forces of both directions are tried:
 where neither moves the spike, it rests for good.
 
-Friction that is mobilised over a way (`Push.turning`) is a share w of its bound, dw = (sign(dz) - w) |dz| / reach
-(Dahl, A solid friction model, TOR-0158(3107-18)-1, Aerospace Corp., 1968, with exponent 1): it stays while the spike is
-held. From where the way last turned on, w is an exponential of the depth.
+Friction that is mobilised over a way (`Push.turning`) is a share w of its bound, dw = (sign(dz) - w) |dz| / reach. This
+is Dahl's law with exponent 1 (A solid friction model, TOR-0158(3107-18)-1, Aerospace Corp., 1968): it stays while the
+spike is held. From where the way last turned on, w is an exponential of the depth.
 """
 
 # Taichi reads the annotations and the source of kernels: no `from __future__ import annotations` here.

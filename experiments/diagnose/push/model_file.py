@@ -45,7 +45,7 @@ def model_of(
 
 def range_of(trials: Sequence[Prepared], frame_stiffness: float | None = None) -> dict[str, Any]:
     """The range of the pushes among `trials`: greatest depth [m], slowest and fastest speed of loading [m/s], and
-    whether one was withdrawn; also the stiffness [N/m] of a frame whose bending was subtracted from their depth. Empty
+    whether one was withdrawn. Also the stiffness [N/m] of a frame whose bending was subtracted from their depth. Empty
     without pushes."""
     pushes = [trial for trial in trials if trial.driven]
     if not pushes:

@@ -98,8 +98,8 @@ class Gaps:
 
     @property
     def residue(self) -> list[Row]:
-        """What the best model leaves beyond the noise: root mean square in the channel's unit (mm, degrees, N), of the
-        channels in which it exceeds what chance makes of the noise's own mean square (3 standard errors)."""
+        """What the best model leaves beyond the noise: root mean square in the channel's unit (mm, degrees, N). Only
+        channels are listed in which it exceeds 3 standard errors of the noise's own mean square."""
         found = []
         for channel, (count, squares, variances) in sorted(self._beyond.items()):
             beyond = (squares - variances) / max(count, 1.0)

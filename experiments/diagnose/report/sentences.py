@@ -166,7 +166,7 @@ def remark_sentences(diagnosis: Row) -> list[str]:
 
 
 def worse_sentences(diagnosis: Row) -> list[str]:
-    """Which conditions, phases and channels the best model explains less well than the base model, in a sentence; none
+    """Which conditions, phases and channels the best model explains less well than the base model, in a sentence. Empty
     where there are none, or where it is the base model. A cell counts where it is worse by half and past noise."""
     conditions = diagnosis.get("by_condition", [])
     common = _common(conditions)
@@ -397,7 +397,7 @@ def findings_in_words(found: Sequence[Finding]) -> list[Finding]:
 
 def candidate_rows(diagnosis: Row) -> list[dict[str, Any]]:
     """``candidates`` of diagnosis.json: the best form of each effect, of what is named, and of the sets of effects that
-    beat all of their parts; the likeliest first, those no better than the base model last."""
+    beat all of their parts. The likeliest come first, those no better than the base model last."""
     best: dict[frozenset[str], Row] = {}
     tried = Counter(frozenset(row["effects"]) for row in diagnosis.get("evidence", []))
     for row in diagnosis.get("evidence", []):

@@ -1,5 +1,5 @@
-"""The first lines of a diagnosis: what is missing, how far that closes the gap, how sure it is, what is left, and what
-to do next; a few sentences made of diagnosis.json alone."""
+"""The first lines of a diagnosis, a few sentences made of diagnosis.json alone. They say what is missing, how far that
+closes the gap, how sure it is, what is left, and what to do next."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any

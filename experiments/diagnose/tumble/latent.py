@@ -1,11 +1,12 @@
 """The force and the torque over time that the model of a tumble misses; up to when it follows what was measured.
 
-At every row of the IMU, measured less modelled specific force, turned into the surface's axes by the measured attitude,
-times the inertia that resists (m along the surface, m + m_b along the normal in the rig); and J times the difference
-in angular acceleration, the slope of the gyro's difference over a few rows. Beside them stand the modelled motion, its
-state and the wheel, for whoever looks for what it depends on. Where model and measurement have gone apart, their states
-differ, and it is the sum of what is missing and of what follows from it; the first seconds show most. A trial without
-an IMU has it from the camera's rows: inertia times the second derivative of measured less modelled place and angle.
+At every row of the IMU the force is measured less modelled specific force times the inertia that resists. It is turned
+into the surface's axes by the measured attitude. The inertia is m along the surface, m + m_b along the normal in the
+rig. The torque is J times the difference in angular acceleration, the slope of the gyro's difference over a few rows.
+Beside them stand the modelled motion, its state and the wheel, for whoever looks for what it depends on. Where model
+and measurement have diverged, their states differ, and it is the sum of what is missing and of what follows from it.
+The first seconds show most. A trial without an IMU has it from the camera's rows: inertia times the second derivative
+of measured less modelled place and angle.
 """
 
 import numpy as np
@@ -70,7 +71,7 @@ def followed_until(trial: TrialData, residual: Array, state: NDArray[np.int8]) -
     """The moment [s] from which these residuals (in standard deviations) are off; None where that is too early.
 
     Only gyro and accelerometers are used: the camera's unknown zero spreads a late error over a whole recording. None
-    too where nothing is off, where little is right before, or where no state of the model (`state`, at the same
+    too where nothing is off, or where little is right before. Also where no state of the model (`state`, at the same
     samples) ended shortly before: motions separate where something touches, catches or lets go.
     """
     seen = np.flatnonzero(trial.of("gyro") | trial.of("ax") | trial.of("ay"))

@@ -171,7 +171,7 @@ class TumbleProblem(Problem):
 
     def switches(self, values: Values, forms: Sequence[Form], trials: Sequence[str]) -> dict[str, Array]:
         """By how much the model jumps within `_SWITCH` of each reading of the IMU, over its noise, by trial, shape
-        [sample_count]; 0 where it does not, and of the other channels."""
+        [sample_count]. It is 0 where it does not, and of the other channels."""
         late, now, early = (self.readings(values, forms, trials, shift) for shift in (_SWITCH, 0.0, -_SWITCH))
         found = {}
         for trial in trials:
@@ -316,8 +316,8 @@ class TumbleProblem(Problem):
         return advice(first.effect, second.effect)
 
     def follows(self, values: Values, forms: Sequence[Form], trial: str) -> float | None:
-        """The moment [s] up to which the model follows a trial, with the simulated gravity that takes it farthest; None
-        where that is no good part of it (`followed_until`)."""
+        """The moment [s] up to which the model follows a trial, with the simulated gravity that takes it farthest. None
+        where that is not a good part of it (`followed_until`)."""
         data, sigma = self._data[trial], self.data.tables.uncertainty.gravity_sim
         scan = 1 + sigma * SCAN if sigma > 0 else np.ones(1)
         points = [values, *({**values, f"gravity_sim[{trial}]": data.gravity_sim * float(g)} for g in scan)]

@@ -145,9 +145,9 @@ def part(
 ) -> dict[str, np.ndarray]:
     """What `compute` gives, arrays by name, or what it gave before for the same settings and code.
 
-    A part of a long case is kept in the folder of the cache as it ends, so that a case that was stopped goes on with
-    those that are missing. `settings`: what JSON takes; everything that the result depends on beside the code of the
-    bed and of this file.
+    A part of a long case is kept in the folder of the cache as it ends. So a case that was stopped continues with the
+    missing parts. `settings`: what JSON takes; everything that the result depends on beside the code of the bed and of
+    this file.
     """
     own = hashlib.sha256(Path(__file__).read_bytes()).hexdigest()
     given = json.dumps({"bed": fingerprint(), "own": own, **settings}, sort_keys=True)

@@ -1,8 +1,8 @@
 """An energy balance kept outside the bed: its motion as the bed has it, the forces written again.
 
-Leapfrog makes it exact: the kinetic energy of the half-step velocities changes by F (v- + v+) / 2 dt over a step, so
-whatever the law, the change is the sum of what the parts of each contact's force do. The normal spring's work is held
-against 2/5 k delta^2.5, which it meets to second order in the step; what dashpots and friction take is summed.
+Leapfrog makes it exact: the kinetic energy of the half-step velocities changes by F (v- + v+) / 2 dt over a step. So
+whatever the law, the change is the sum of the works of the parts of each contact's force. The normal spring's work is
+held against 2/5 k delta^2.5, which it meets to second order in the step; what dashpots and friction take is summed.
 """
 
 import math

@@ -1,8 +1,8 @@
 """Dosta et al. 2024's penetration: a steel ball of 20 mm at 5 m/s into 25,000 grains of 2 mm, here and in LIGGGHTS.
 
-Both begin when the ball, thrown down at 5 m/s from 60 mm, touches the first grain, and last 3 ms, in which it goes
-into them by more than its radius; the 100 ms of the paper take an hour on one core. The grains start where the data
-have them, without history. The walls are of what the grains are of.
+Both begin when the ball, thrown down at 5 m/s from 60 mm, touches the first grain. They last 3 ms, in which it goes
+into the grains by more than its radius. The 100 ms of the paper take an hour on one core. The grains start where the
+data have them, without history. The walls are of what the grains are of.
 """
 
 import gzip

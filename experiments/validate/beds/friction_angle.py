@@ -1,24 +1,23 @@
 """The friction angle of a sheared sample against LAMMPS: other boundaries, another code, the same grains.
 
 Ours is ``dem.measure.element``: between rough planes, the lid servoed to its pressure. Theirs has no walls: a box
-periodic in
-all directions, sheared by its tilt (Lees & Edwards) at the volume to which our sample came at large strain, so that
-both are at the critical state of one packing fraction. The largest overlaps aside, angles do not depend on what
-differs: the stress ratio of hard grains is a matter of friction, rolling friction and inertial number alone.
+periodic in all directions, sheared by its tilt (Lees & Edwards). Its volume is that to which our sample came at large
+strain, so that both are at the critical state of one packing fraction. The largest overlaps aside, angles do not depend
+on what differs: the stress ratio of hard grains is a matter of friction, rolling friction and inertial number alone.
 
-LAMMPS' rolling spring is of one stiffness, k = E d / 10, where ours follows the tangential one; its bound, mu_r R* F_n,
+LAMMPS' rolling spring is of one stiffness, k = E d / 10, where ours follows the tangential one. Its bound, mu_r R* F_n,
 is the same, and its twisting is Marshall's, as ours.
 
-A friction angle can be read in three ways: as shear over normal stress on the plane of shear; as that of triaxial
-compression at the same I1 I2 / I3; or, as Mohr and Coulomb have it, from the circle through the largest and the least
-principal stress of the whole tensor, sin(angle) = (s1 - s3) / (s1 + s3), which asks for no plane.
+A friction angle can be read in three ways. The first is shear over normal stress on the plane of shear. The second is
+that of triaxial compression at the same I1 I2 / I3. The third is Mohr and Coulomb's, from the circle through the
+largest and the least principal stress of the whole tensor, sin(angle) = (s1 - s3) / (s1 + s3). It needs no plane.
 
 Published simulations of simple shear give shear over the mean of the three normal stresses, tau / p, and the packing
 fraction where slow flow settles: Chialvo, Sun & Sundaresan 2012, spheres of one size, linear springs, periodic (case
 ``friction-angle-published``). Where the normal stresses are alike the Mohr circle's angle is arcsin(tau / p). Those
-samples are as nearly theirs as can be; softer ones, whose overlaps are counted whole, lie denser (at friction 0.1 0.642
-where the spheres are ten times as soft), and sizes within 15 % and an inertial number of 0.01 make tau / p 0.421 for
-0.381 at friction 0.5.
+samples are as nearly theirs as can be. Softer ones, whose overlaps are counted whole, lie denser (at friction 0.1 0.642
+where the spheres are ten times as soft). Sizes within 15 % and an inertial number of 0.01 make tau / p 0.421 for 0.381
+at friction 0.5.
 """
 
 import io

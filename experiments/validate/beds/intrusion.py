@@ -1,10 +1,10 @@
 """Slow plates and a cone against 3D-RFT: one plate calibrates its stress xi_n, the others and the cone are predicted.
 
 A level plate going straight down bears 0.876 xi_n z A, a cone xi_n alpha_z z^3 pi tan(b) / (3 cos(b)), b its
-half-angle (`rigid.ground.rft` has alpha and xi_n). The law has one number of the material, xi_n; as in experiments
-(Li, Zhang & Goldman 2013, Science 339:1408) it is taken from one plate here, the largest, and not from the friction
-angle: the cubic in mu that 3D-RFT gives for it is far from such grains (docs/validation.md), and says nothing about
-how forces go with area and shape, which is what the law is for.
+half-angle (`rigid.ground.rft` has alpha and xi_n). The law has one number of the material, xi_n. As in experiments (Li,
+Zhang & Goldman 2013, Science 339:1408) it is taken from one plate, the largest, and not from the friction angle. The
+cubic in mu that 3D-RFT gives for it is far from such grains (docs/validation.md). It says nothing about how forces
+depend on area and shape, which is what the law is for.
 
 Forces are means over the same depths for all, from half to the whole width of the largest plate: nearer to the surface
 a plate bears in proportion to its width rather than to its depth, which no law of z A has. 3D-RFT is for grains small

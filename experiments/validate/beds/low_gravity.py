@@ -1,8 +1,8 @@
 """One ball in like beds from 9.81 down to 1e-5 m/s2: sunk from rest, at one Froude number, dropped as in experiments.
 
-Without cohesion nothing but g gives hard grains a time or a stress, so depth over the ball's diameter D is a function
-of v / sqrt(g D) and of ratios of lengths and densities alone; Slonaker & Kamrin 2017 say the same of any body where
-grains are a frictional continuum, and there the grains' size is out of it too. The beds are prepared anew at each
+Without cohesion nothing but g gives hard grains a time or a stress. So depth over the ball's diameter D is a function
+of v / sqrt(g D) and of ratios of lengths and densities alone. Slonaker & Kamrin 2017 state the same of any body where
+grains are a frictional continuum, and there the grains' size has no effect either. The beds are prepared anew at each
 gravity with the stiffness, step and criteria of settling that the bed chooses by itself: a constant tuned at 1 g would
 show here.
 """

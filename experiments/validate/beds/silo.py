@@ -1,8 +1,8 @@
 """Janssen's silo: what the floor of a narrow box with rough walls carries, at three depths of filling.
 
-Four plane walls of width D stand in the periodic box. Grains are rained in and come to rest in a drag; then the walls
-rise slowly, so that friction is up all along them, as Janssen 1895 has it and as experiments bring it about. With one K
-for the ratio of the stresses the floor carries
+Four plane walls of width D stand in the periodic box. Grains are rained in and come to rest in a drag. Then the walls
+rise slowly, so that friction acts upwards all along them, as Janssen 1895 assumes and as experiments arrange it. With
+one K for the ratio of the stresses the floor carries
     W_f = W_s (1 - exp(-W / W_s)),  W_s = rho g D^3 / (4 mu_w K),
 W the weight poured in. K is not known beforehand: one W_s is fitted to the three fillings. Coulomb's law bounds the
 friction of the walls by mu_w times what presses on them; Janssen takes it as reached all over.

@@ -63,8 +63,8 @@ def _reference(y0: np.ndarray, *, rescaled: bool = False) -> np.ndarray:
 def staggered_pair(y0: np.ndarray, steps: int, *, middle: bool) -> np.ndarray:
     """A leapfrog for ``_reference``'s two grains, in numpy: (x, v, w of both), shape [6, 3].
 
-    ``y0``: as ``_reference`` has it. ``middle``: the slip of a step is that across the normal at its middle, where the
-    velocity is, as the bed has it (to second order in the step); else at its end.
+    ``y0``: as ``_reference`` has it. ``middle``: whether the slip of a step is that across the normal at its middle,
+    where the velocity is; else at its end. The bed takes the middle (to second order in the step).
     """
     dt = END / steps
     x1, v1, w1, x2, v2, w2, u = y0.reshape(7, 3).copy()

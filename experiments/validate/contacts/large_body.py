@@ -1,7 +1,7 @@
 """A small grain on large bodies: does it roll off the neck between two of them, at any ratio of sizes?
 
 Vyas, Ottino, Lueptow & Umbanhowar 2025 (Comput. Phys. Commun. 310, 109524): with static friction and a ratio above
-about 3, velocity Verlet may hold such a grain where it should fall, as the history of the contact is summed with the
+about 3, velocity Verlet may hold such a grain where it should fall. The history of the contact is summed with the
 velocity of half a step before and turned with the normal of the step's end.
 
 A sphere of radius r on two of radius R that touch lies at rho = sqrt((R + r)^2 - R^2) from their line of centres. Let

@@ -1,8 +1,8 @@
 """Contact by contact and along the trajectory against LIGGGHTS and LAMMPS, where they are installed.
 
 The law that all three have: Hertz along the normal, Mindlin's no-slip spring with history sideways, dashpots of Tsuji
-et al. 1992, which may pull at a contact's end. They differ where a contact slides with a dashpot, and in small terms
-(LAMMPS takes the whole radius as the arm of the spin, and keeps the length of the spring as it turns it). So every
+et al. 1992, which may pull at a contact's end. They differ where a contact slides with a dashpot, and in small terms.
+LAMMPS takes the whole radius as the arm of the spin, and keeps the length of the spring as it turns it. So every
 assembly is run without friction; without dashpots; and with a friction that slides only where the normal force changes
 its sign.
 
@@ -10,17 +10,17 @@ In time the peers are of first order: their dashpots see the velocity of half a 
 across the normal of the step's end. Where nothing else differs, the difference has to fall with the step.
 
 Where a contact slides with a dashpot, each code is held against its own law, written here in numpy with one switch for
-the three. A peer that its own law meets to rounding, and a bed that its own meets as well as where nothing slides,
-differ in that switch and in nothing else; how much it does stands in the remarks, and is no error of either. With k u
-the spring's pull, c v the dashpot's and N = mu |F_n|, the dashpot's part in F_n included, the laws are:
+the three. Suppose a peer meets its own law to rounding, and the bed its own as well as where nothing slides. Then both
+differ in that switch alone. How much it changes stands in the remarks, and is no error of either. With k u the spring's
+pull, c v the dashpot's and N = mu |F_n|, the dashpot's part in F_n included, the laws are:
 
 - LIGGGHTS (``tangential history``; its manual, gran_tangential_history: Ft_spring is held at cof Fn): where k |u| > N
   the force is N along the spring, which is set back to N / k, without the dashpot; else k u + c v, unbounded.
 - the bed (docs/bed.md): the same, but the sum k u + c v is held within N, too. The spring is not set back for that.
 - LAMMPS (``pair_style granular``, ``tangential mindlin``; its manual has the two formulas): where |k u + c v| > N the
   force is N along that sum (nothing where the spring has no length yet), and the spring is set back to
-  u = -(F_t + c v) / k: to N less the dashpot's part. Moreover c is that of the normal dashpot, the spring is turned
-  into the contact's plane at its full length before the step's slip is added, and spins slip with the whole radius.
+  u = -(F_t + c v) / k: to N less the dashpot's part. Moreover c is that of the normal dashpot. The spring is turned
+  into the contact's plane at its full length before the step's slip is added. Spins slip with the whole radius.
 
 The motion of the written law is that of both peers: velocity Verlet, whose forces see the velocities of half a step
 before. So the peers are met to rounding and the bed to first order.

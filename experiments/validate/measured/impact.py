@@ -1,12 +1,11 @@
 """Katsuragi & Durian's drops: one law of force for all heights, m a = m g - m v^2 / d1 - k z.
 
-As they do, the law is read off a(z, v): at each depth the forces of drops that pass it at different speeds are put on a
-straight line over v^2, whose slope is 1 / d1 there and whose start is what depth alone does, k z / m if the law is
-right. Both are left free at every depth (``Separated``), so that a bed whose force has another form shows it. What it
-shows is the published k z / m beside a drag that is larger where the ball goes in; refit with that (``Refit``) the law
-is asked for the depths at which its own balls stop. A fit of d1 and k/m to v^2 over depth, as it stood here before,
-hides it: where the ball goes in the drag is several times as large as deeper down, and one d1 for all of it stops no
-ball where it stopped.
+As they do, the law is read off a(z, v). At each depth a straight line over v^2 is fitted to the forces of drops that
+pass it at different speeds. Its slope is 1 / d1 there, and its start is the force of depth alone, k z / m if the law is
+right. Both are left free at every depth (``Separated``), so that a bed whose force has another form shows it. It shows
+the published k z / m beside a drag that is larger where the ball goes in. Refitted with that (``Refit``) the law states
+the depths at which its own balls stop. A fit of d1 and k/m to v^2 over depth hides it. Where the ball goes in, the drag
+is several times as large as deeper down. So one d1 for all of it stops no ball where it stopped.
 
 The force is taken from the energy, d(v^2)/dz = 2 g - 2 F / m, over bins of depth, so that nothing is differentiated
 twice. By the law v^2 over z is known in closed form (Clark & Behringer 2013, EPL 101, 64001).

@@ -1,8 +1,8 @@
 """Plates of 60, 80 and 100 mm pushed into loose dry sand: predicted from its density and its angle alone.
 
 The sand is not named; 1330 kg/m3 and an angle of repose of 29 degrees are what its authors state. Grains of quartz
-(2650 kg/m3) that lie at a packing of 0.502 have that density, and a rolling friction of 0.356 has 28.3 to 28.7 degrees
-on the plane of shear and 0.501 fluffed (docs/materials.md): nothing else is chosen, and no force enters.
+(2650 kg/m3) that lie at a packing of 0.502 have that density. A rolling friction of 0.356 gives 28.3 to 28.7 degrees on
+the plane of shear and 0.501 fluffed (docs/materials.md). Nothing else is chosen, and no force enters.
 
 Without cohesion, and where neither grains nor speed nor walls count, a plate's force can only be
     F = rho g D^3 f(z / D)

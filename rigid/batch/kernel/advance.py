@@ -292,9 +292,9 @@ def make_inner(parts: SimpleNamespace) -> Any:
 def make_records(parts: SimpleNamespace) -> Any:
     """Four Taichi functions.
 
-    `record` writes the state at the share `u` of a step of `dt` [s] from `now` to `then`, by cubics; `follow` keeps the
-    launch and the largest speeds in the tally `t`, `enter` theta on the first entry into each state; `summarise` writes
-    the trial's row of the summary.
+    `record` writes the state at the share `u` of a step of `dt` [s] from `now` to `then`, by cubics. `follow` keeps the
+    launch and the largest speeds in the tally `t`. `enter` keeps theta on the first entry into each state. `summarise`
+    writes the trial's row of the summary.
     """
     from hedgebed_taichi import ti
 

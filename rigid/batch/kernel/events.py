@@ -1,7 +1,7 @@
 """Events of a batched trial: when within a step the first one happens, and what changes then.
 
-Kinds: 1 touch, 2 lift, 3 slip through zero, 4 static bound, 5 the wheel stops, 6 and 7 pulleys and bearing come to a
-stop, 8 and 9 they give way, 10 a term's own coordinate changes its mode.
+Kinds 1 to 5: touch, lift, slip through zero, static bound, the wheel stops. Kinds 6 and 7: pulleys and bearing come to
+a stop. Kinds 8 and 9: they give way. Kind 10: a term's own coordinate changes its mode.
 """
 
 from types import SimpleNamespace

@@ -1,8 +1,8 @@
 """The rig's wires as springs: the counterweight no longer moves exactly as the platform does, upside down.
 
-The counterweight hangs at -b + const, b its descent; with eta the height of the shaft the wires are stretched by
-s = b - eta beyond their stretch at rest, m_b g / k, at which their tension is m_b g, whatever gravity_sim says: what
-(m - m_b) g differs from the weight is borne by the platform. In place of the rigid rig's m_b eta'^2 / 2
+The counterweight hangs at -b + const, b its descent; eta is the height of the shaft. The wires are stretched by s = b -
+eta beyond their stretch at rest, m_b g / k. There their tension is m_b g, whatever gravity_sim says: what (m - m_b) g
+differs from the weight is borne by the platform. In place of the rigid rig's m_b eta'^2 / 2
 
     T = m_b b'^2 / 2,  V = k s^2 / 2,  D = c s'^2 / 2,
 

@@ -23,7 +23,7 @@ def push_loading(grown, depth, layer_depth, layer_width, layer_slope, layer_step
 
 def reaches_surface(layer_depth, layer_width):
     """Whether the bed changes from the surface on: a tenth of the change or more stands there. The width of an edge is
-    counted from a tenth to nine tenths, as a rise time is; a layer has undisturbed ground above its edge."""
+    counted from a tenth to nine tenths, as a rise time is. A layer has undisturbed ground above its edge."""
     return layer_depth < log(9.0) * layer_width
 
 

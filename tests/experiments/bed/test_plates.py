@@ -149,11 +149,16 @@ def test_the_force_on_a_foot_of_one_s_own_is_printed_and_bad_input_is_refused_by
     assert main(["bed", "foot", str(tmp_path / "none.json"), "cone", "--depth", "0.01"]) == BAD_INPUT
 
 
-def test_forces_that_cancel_by_symmetry_are_printed_as_zero(capsys):
-    """A cylinder pushed straight down: round-off, some 1e-17 N, is no force."""
-    assert main(["bed", "foot", str(KEPT / "rft.json"), "cylinder", "--size", "16mm", "--depth", "1.4mm"]) == DONE
+def test_forces_that_cancel_by_symmetry_are_printed_as_zero_and_others_with_95_per_cent(capsys):
+    """A cylinder pushed straight down: round-off, some 1e-17 N, is no force. t of two degrees of freedom is 4.303."""
+    options = ["bed", "foot", str(KEPT / "rft.json"), "cylinder", "--size", "16mm", "--depth", "1.4mm"]
+    assert main([*options, "--json"]) == DONE
+    error = json.loads(capsys.readouterr().out)["std"][2]
+    assert main(options) == DONE
     printed = [line.split(" = ")[1] for line in capsys.readouterr().out.splitlines()[:3]]
     assert printed[:2] == ["0 N", "0 N"] and float(printed[2].split()[0]) > 0.1
+    assert len(read_rft(KEPT / "rft.json").left_out) == 3
+    assert float(printed[2].split()[2]) == pytest.approx(4.303 * error, rel=0.05)
 
 
 def test_the_depth_for_a_load_is_printed_with_its_interval(capsys):

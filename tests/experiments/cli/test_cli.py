@@ -173,6 +173,8 @@ def test_completion_knows_commands_and_options():
         (["tumble", "--effects", "pendulm.length=2"], "pendulum"),
         (["penetrate", "--tip", "flatt"], "flat"),
         (["penetrate", "penetrate-ful"], "penetrate-full"),
+        (["sweep", "--experiment", "tumbel", "--over", "torque=[0.1]"], "tumble"),
+        (["validate", "--only", "janssn"], "janssen"),
     ],
 )
 def test_a_misspelt_word_is_answered_with_the_nearest(typed, meant, capsys, monkeypatch, tmp_path):
@@ -181,6 +183,43 @@ def test_a_misspelt_word_is_answered_with_the_nearest(typed, meant, capsys, monk
     text = capsys.readouterr().err
     assert re.search(rf"\b{meant.lstrip('-')}\b", text) and len(text) < 250, text
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    "typed, meant",
+    [
+        (["hop", "--ground", "groud.toml"], "ground.toml"),
+        (["penetrate", "grund"], "ground.toml"),
+        (["sweep", "--experiment", "tumble", "--table", "tabel.csv"], "table.csv"),
+        (["bed", "foot", "rtf.json", "cone", "--depth", "10mm"], "rft.json"),
+        (["resume", "my-rnu"], "my-run"),
+        (["view", "my-rnu"], "my-run"),
+        (["diagnose", "my-rnu"], "my-run"),
+        (["calibrate", "my-rnu"], "my-run"),
+    ],
+)
+def test_a_misspelt_file_or_folder_is_answered_with_the_one_beside_it(typed, meant, capsys, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    for name in ("ground.toml", "table.csv", "rft.json"):
+        (tmp_path / name).write_text("")
+    (tmp_path / "my-run").mkdir()
+    assert main(typed) == 2
+    assert f"did you mean {meant!r}?" in capsys.readouterr().err
+
+
+def test_an_option_that_a_command_has_not_is_answered_with_its_help_where_none_is_spelt_like_it(capsys):
+    assert main(["fmu", "x.fmu", "--out", "x"]) == 2
+    text = capsys.readouterr().err
+    assert "Did you mean" not in text and "`hedgebed fmu --help`" in text
+    assert main(["fmu", "x.fmu", "--platfrom", "cubli"]) == 2
+    assert "Did you mean --platform?" in capsys.readouterr().err
+
+
+def test_no_help_shows_an_empty_default(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "160")
+    for command in (["sweep"], ["effects"], ["experiments", "list"]):
+        assert main([*command, "--help"]) == 0
+        assert not re.search(r"default: (\]|\(\)|None)", capsys.readouterr().out)
 
 
 def test_a_check_of_the_experiment_refuses_before_a_folder_is_made(dig, capsys):

@@ -81,6 +81,19 @@ def test_a_warning_of_both_runs_stands_once_and_one_of_either_is_told_with_its_l
     assert [text.split(": ") for text in warnings] == [["both", "the wind blew"], ["sand", "sand's own"]]
 
 
+def test_both_sides_of_a_comparison_have_halves_of_95_per_cent_intervals():
+    """Of a law 1.96 standard deviations, over three beds t s / sqrt(3) with t = 4.303; of one bed none."""
+    number = {"quantities": {"highest": {"value": 1.0, "std": 0.1, "unit": "m"}}}
+    one_bed = {"quantities": {"highest": {"value": 1.0, "std": None, "unit": "m"}}, "beds": [1]}
+    ((law, beds),) = [
+        (row["first_half"], row["second_half"]) for row in compare._compared([number, number | {"beds": [1, 2, 3]}])
+    ]
+    assert law == pytest.approx(0.196) and beds == pytest.approx(4.303 * 0.1 / math.sqrt(3), rel=1e-3)
+    assert compare._compared([number, one_bed])[0]["second_half"] is None
+    spike = number | {"experiment": "penetrate", "runs": [{"seed": 1}, {"seed": 2}]}
+    assert compare._compared([spike, number])[0]["first_half"] == pytest.approx(12.706 * 0.1 / math.sqrt(2), rel=1e-3)
+
+
 def test_no_difference_is_told_in_per_cent_of_next_to_nothing():
     assert compare._relative(2.0, 3.0) == 0.5 and compare._relative(-2.0, 3.0) == 2.5
     assert compare._relative(1e-25, -4e-3) is None and compare._relative(0.0, 1.0) is None

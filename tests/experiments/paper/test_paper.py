@@ -193,7 +193,7 @@ def test_angles_at_the_density_of_jsc_1a_are_those_of_the_kept_runs():
 def test_the_error_of_the_spring_dampers_angle_is_that_of_the_page():
     (only,) = spring_angles()
     page = (RESULTS.parent / "notes" / "calibrate.md").read_text(encoding="utf-8")
-    assert f"{only.angle} ± {only.half}" in page
+    assert f"{only.angle} ± {only.std}" in page
 
 
 def test_the_picture_of_the_signs_names_the_grains_of_its_data(small):
@@ -207,7 +207,7 @@ def test_the_picture_of_the_signs_names_the_grains_of_its_data(small):
     words = [text.get_text() for text in figure.legends[0].get_texts()]
     assert words[0] == "spring-damper of sand"
     assert words[3:5] == list(LEGEND)
-    assert "friction" in words[1] and "± 9°" in words[2]
+    assert "friction" in words[1] and "± 18° (95 %" in words[2]
     assert [text.get_text() for text in figure.axes[0].texts] == ["sand"]
     law, *bars_and_grains = (to_hex(entry.get_color()) for entry in figure.legends[0].get_lines())
     assert set(bars_and_grains[:2]) == {law}

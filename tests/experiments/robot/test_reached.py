@@ -4,9 +4,10 @@ import warnings
 
 import numpy as np
 import pytest
+from tumble_runs import stop_at
 
 from coupling.robot import FootForces, LawFeet, MujocoRobot, RobotRun, find_feet, law_under_feet, load_model
-from experiments.grains.tracked_frames import PlatformFrames
+from experiments.grains.tracked_frames import HARDER, PlatformFrames
 from experiments.robot import experiment as robot
 from experiments.robot.feet import FEW, feet_quantities, feet_reached, heights_of, too_deep
 from experiments.robot.on_grains import RobotFollowed
@@ -15,7 +16,7 @@ from experiments.robot.result import RobotFrames
 from experiments.robot.settings import RobotSettings
 from experiments.runs.folder import read_series
 from rigid.spatial.quaternions import to_matrix
-from vis.film.film import Sheet
+from vis.film.film import Sheet, moments
 from vis.film.reel import SpaceReel
 from vis.pictures.frames import frame_names, frames_of, read_frames
 from vis.robot.report import write_robot_report
@@ -121,6 +122,34 @@ def test_the_arrow_of_a_blow_of_several_weights_fits_into_its_picture(tmp_path, 
         sheet.draw(time)
     assert cut
     sheet.close()
+
+
+def test_a_picture_shows_the_largest_force_also_where_a_run_stopped_and_few_frames_are_asked_for(tmp_path, monkeypatch):
+    """The same blow of some 120 N at 80 ms; frames at even times come every 37 ms, the nearest after 73 ms."""
+    monkeypatch.setattr("experiments.runs.whole_runs.write_report", lambda *_: None)
+    (tmp_path / "lump.xml").write_text(LUMP)
+    given = {"model": str(tmp_path / "lump.xml"), "feet": ("foot",), "height": 0.02, "stiffness": 2e4, "damping": 0.0}
+    settings = RobotSettings(**given, surface="brick", duration=0.11, frame_count=3)
+    largest = robot.run(settings, tmp_path / "whole").quantities["largest_force"].value
+    reel = SpaceReel(tmp_path / "whole")
+    hardest = int(np.argmax(reel.loads))
+    assert reel.loads[hardest] == pytest.approx(largest, rel=HARDER - 1) and 0 < hardest < len(reel) - 1
+    even = np.delete(reel.times, hardest)
+    assert even == pytest.approx([0.0, 0.11 / 3, 0.22 / 3, 0.11], abs=1e-3)
+    assert np.delete(reel.loads, hardest).max() < 0.9 * largest
+    shown = {name: (title, time) for name, title, time, _ in moments([reel])}
+    title, time = shown["force"]
+    assert time == reel.times[hardest] and title.endswith("largest force")
+    files = sorted((tmp_path / "whole" / "frames").iterdir())
+    steps = len(read_series(tmp_path / "whole" / "series" / "motion.csv")["t_s"])
+    for step in (steps // 2, (9 * steps) // 10):  # before and after that moment
+        with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
+            stop_at(patch, step)
+            robot.run(settings, tmp_path / f"stopped-{step}")
+        robot.resume(tmp_path / f"stopped-{step}")
+        parts = sorted((tmp_path / f"stopped-{step}" / "frames").iterdir())
+        assert [file.name for file in parts] == [file.name for file in files]
+        assert [file.read_bytes() for file in parts] == [file.read_bytes() for file in files]
 
 
 @pytest.mark.parametrize(("radius", "deep"), [(0.005, True), (0.03, False)])

@@ -99,7 +99,7 @@ def test_a_table_gives_a_run_for_each_row_and_leaves_empty_cells_to_the_rest(tmp
         ({"experiment": "jump", "over": ["torque=[0.1]"]}, ("'jump'", "tumble")),
         ({"over": ["torque=[0.1]"], "sampling": "sobol", "samples": 48}, ("samples = 48", "power of two")),
         ({"over": ["torque=[0.1]"], "scheduler": "tcp://a:1", "workers": 2}, ("workers = 2", "scheduler")),
-        ({"table": "nowhere.csv"}, ("nowhere.csv", "No such file")),
+        ({"table": "nowhere.csv"}, ("nowhere.csv", "no such file")),
     ],
 )
 def test_what_cannot_be_swept_is_refused_by_key_and_value(given, words):
