@@ -229,14 +229,12 @@ class RunFolder:
         """Make the folder of a new run and write its run.toml.
 
         Raises ValueError, naming the path, if it is in use (a file, or a folder that holds something) or cannot be
-        written. Also if the settings would not read back unchanged from run.toml.
+        written; also for settings that run.toml would not give back unchanged.
         """
         path = Path(path)
         text, where = settings_toml(command, settings, version, code), f"out = {str(path)!r}"
         if type(settings)(**settings_in(tomllib.loads(text))) != settings:
-            raise ValueError(
-                f"the settings of {command} cannot be kept: they do not read back from run.toml as they are"
-            )
+            raise ValueError(f"the settings of {command} cannot be kept: run.toml would not give them back as they are")
         if path.exists() and not path.is_dir():
             raise ValueError(f"{where} is a file: name a folder that is empty or does not exist yet")
         cls._check_free(path)

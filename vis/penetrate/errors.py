@@ -2,7 +2,7 @@
 
 A number over n beds has t s / sqrt(n), that of a fit t times its standard error by the jackknife over runs. t is
 Student's with n - 1 degrees of freedom, n the number of beds or of runs (`rigid.intervals`). Without a bed it is 1.96
-standard errors of the model; where the scatter of few beds is in it, Student's t with the freedom of both together.
+standard errors of the model. With the scatter of few beds in it, it is Student's, with the freedom of both together.
 """
 
 from __future__ import annotations
