@@ -234,9 +234,7 @@ class RunFolder:
         path = Path(path)
         text, where = settings_toml(command, settings, version, code), f"out = {str(path)!r}"
         if type(settings)(**settings_in(tomllib.loads(text))) != settings:
-            raise ValueError(
-                f"the settings of {command} cannot be kept: they do not read back from run.toml as they are"
-            )
+            raise ValueError(f"the settings of {command} cannot be kept: they do not read back unchanged from run.toml")
         if path.exists() and not path.is_dir():
             raise ValueError(f"{where} is a file: name a folder that is empty or does not exist yet")
         cls._check_free(path)
@@ -268,8 +266,8 @@ class RunFolder:
         try:
             table = tomllib.loads((path / "run.toml").read_text(encoding="utf-8"))
         except OSError:
-            why = "it has no run.toml" if path.is_dir() else f"there is no such folder{alike(path, folders=True)}"
-            raise ValueError(f"{str(path)!r} is not a run folder: {why}") from None
+            why = "has no run.toml" if path.is_dir() else f"is not there{alike(path, folders=True)}"
+            raise ValueError(f"{str(path)!r} is not a run folder: it {why}") from None
         except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
             raise ValueError(f"{str(path / 'run.toml')!r} cannot be read: {error}") from None
         if table.get("format") not in RUN_FORMATS or not isinstance(table.get("settings"), dict):
