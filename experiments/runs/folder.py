@@ -229,12 +229,12 @@ class RunFolder:
         """Make the folder of a new run and write its run.toml.
 
         Raises ValueError, naming the path, if it is in use (a file, or a folder that holds something) or cannot be
-        written; also for settings that run.toml would not give back unchanged.
+        written. Also if the settings would not read back unchanged from run.toml.
         """
         path = Path(path)
         text, where = settings_toml(command, settings, version, code), f"out = {str(path)!r}"
         if type(settings)(**settings_in(tomllib.loads(text))) != settings:
-            raise ValueError(f"the settings of {command} cannot be kept: run.toml would not give them back as they are")
+            raise ValueError(f"the settings of {command} cannot be kept: they do not read back unchanged from run.toml")
         if path.exists() and not path.is_dir():
             raise ValueError(f"{where} is a file: name a folder that is empty or does not exist yet")
         cls._check_free(path)
@@ -266,8 +266,8 @@ class RunFolder:
         try:
             table = tomllib.loads((path / "run.toml").read_text(encoding="utf-8"))
         except OSError:
-            why = "it has no run.toml" if path.is_dir() else f"there is no such folder{alike(path, folders=True)}"
-            raise ValueError(f"{str(path)!r} is not a run folder: {why}") from None
+            why = "has no run.toml" if path.is_dir() else f"is not there{alike(path, folders=True)}"
+            raise ValueError(f"{str(path)!r} is not a run folder: it {why}") from None
         except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
             raise ValueError(f"{str(path / 'run.toml')!r} cannot be read: {error}") from None
         if table.get("format") not in RUN_FORMATS or not isinstance(table.get("settings"), dict):

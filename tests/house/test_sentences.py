@@ -64,7 +64,8 @@ def test_no_public_docstring_has_a_sentence_of_more_than_25_words(package):
 def test_a_long_sentence_counts_in_prose_and_entries_but_not_in_examples_code_tables_and_equations():
     long = " ".join(["word"] * (MOST + 1)) + "."
     assert long_sentences(f"Short.\n\n{long}\nShort.") == [long]
-    assert long_sentences(f"Args:\n    name: it is short.\n    other: {long}\n") == [long]
+    entries = f"Args:\n    name: it is short.\n    other: {long}\n"
+    assert long_sentences(entries) == [long]
     for other in (
         f">>> {long}",
         f"```\n{long}\n```",

@@ -10,14 +10,17 @@ from html.parser import HTMLParser
 import golden
 import numpy as np
 import pytest
+from matplotlib.colors import to_hex
+from matplotlib.figure import Figure
 from PIL import Image
 
 import vis
 from rigid.intervals import student
 from vis.page import plots
 from vis.page.folder import read_folder, read_series
+from vis.page.plots import BED, MODEL
 from vis.penetrate.errors import in_95
-from vis.penetrate.plot_drops import _running_mean
+from vis.penetrate.plot_drops import _draw_rests, _running_mean
 from vis.penetrate.report import PLOTS, make_plots
 from vis.penetrate.summary import summarise
 from vis.report import write_report
@@ -213,6 +216,17 @@ def test_a_spike_that_never_rests_has_no_sinkage_and_the_report_says_so(tmp_path
     assert said["tiles"][0]["value"] == "unknown"
     caption = plot_called("set_down", run).caption
     golden.golden("report/never_rests", [said["answers"][0]["answer"], caption])
+
+
+def test_the_law_of_drops_is_drawn_once_and_a_bar_beyond_the_picture_ends_with_an_arrow(tmp_path, make_run):
+    run = read_folder(make_run(tmp_path, frames=0))
+    for panel in plot_called("drops", run).figure.axes[:2]:
+        assert sum(to_hex(line.get_color()) == to_hex(MODEL) for line in panel.lines) == 1
+    figure = Figure()
+    axis = figure.add_subplot(xlim=(0, 1), ylim=(4.0, 0.0))
+    _draw_rests(axis, [(1.0, 0.2, "bed", BED), (3.0, 6.4, "spring-damper", MODEL)])
+    arrows = [(line.get_marker(), *line.get_ydata()) for line in axis.lines if line.get_marker() in "^v"]
+    assert arrows == [("^", 0.0), ("v", 4.0)]
 
 
 def test_a_set_down_is_drawn_from_letting_go_to_rest(tmp_path, make_run):

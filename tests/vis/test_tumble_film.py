@@ -307,6 +307,8 @@ def test_a_robot_on_a_law_is_seen_level_with_the_surface_and_its_height_in_scale
     assert up == pytest.approx(4 * rise * reel.times[index] * (1 - reel.times[index]) - 5e-3, abs=1e-6)
     assert f"lowest foot {1e3 * up:.3g} mm above" in reel.line(index)
     assert "5 mm below" in reel.line(0) and sheet.panels[0].camera.arrow
+    reel.loads[:] = 345.6
+    assert reel.line(0).endswith("force 346\N{NO-BREAK SPACE}N") and "force" not in reel.line(0, short=True)
     beside = round((panel.place[0] + 0.3 * panel.place[2]) * 1600)
     ground = np.flatnonzero((abs(image[:, beside] - np.round(255 * np.array(GROUND))) < 4).all(axis=1))
     if rise > 0.5:  # the camera follows: the ground has left the picture, and the robot is in its middle

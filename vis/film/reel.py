@@ -18,6 +18,7 @@ from scipy.sparse.csgraph import connected_components
 
 from rigid.result import read_result
 from vis.page.folder import read_columns
+from vis.page.numbers import quote
 from vis.page.plots import Array
 from vis.page.report import Result
 from vis.pictures.canvas import HEIGHT, colour_top, moved_since, nice_above
@@ -269,9 +270,12 @@ class SpaceReel(_Filmed):
         return low, high
 
     def line(self, index: int, *, short: bool = False) -> str:
-        """Time, state, and unless it is to be `short` where the lowest foot or spike is, as text on a picture."""
+        """Time, state, and unless it is to be `short` where the lowest foot or spike is and the force on a robot."""
         state = f"    {self.states[self.row(index)]}" if len(self.states) else ""
-        return f"t = {self.times[index]:.3f} s{state}{'' if short else self._height(self.frames[index])}"
+        long = "" if short else self._height(self.frames[index])
+        if long and self.what == "robot" and self.loads[index] > 0.0:
+            long += f"    force {quote(float(self.loads[index]), unit='N')}"
+        return f"t = {self.times[index]:.3f} s{state}{long}"
 
     def _height(self, frame: Frame) -> str:
         """How far the lowest foot, spike or point is from the undisturbed surface, in words."""

@@ -49,8 +49,10 @@ def drops_plot(run: RunFolder) -> Plot | None:
         end = max(_settled(r) for r in here)
         early = [r.bed.time[0] - _touch(r.bed) for r in here if r.bed is not None and above_surface(r.bed)]
         begin = min(-0.03 * end, *(max(_first_touch(r.bed), -0.5 * end) for r in here)) if early else -0.03 * end
+        # One law: dashes of several runs, which differ in where they start only, look like a full line.
+        law = next((r for r in here if r.model is not None), None)
         for r in here:
-            for series, colour, style in ((r.bed, BED, "-"), (r.model, MODEL, DASHED)):
+            for series, colour, style in ((r.bed, BED, "-"), (r.model if r is law else None, MODEL, DASHED)):
                 if series is None:
                     continue
                 start = _touch(series)
@@ -165,7 +167,7 @@ def set_down_plot(run: RunFolder) -> Plot | None:
     if rests:
         caption += " Right: the depth at rest."
     if sure:
-        caption += f" ±: half of the {OVER_BEDS}; a bar that leaves the picture is longer than shown."
+        caption += f" ±: half of the {OVER_BEDS}; a bar with an arrow is longer than shown."
     if has_model(sets):
         fitted = "all beds" if many else "this bed's drives and drops"
         caption += f" The spring-damper is the one fitted to {fitted}; where it rests is predicted, not fitted."
@@ -210,6 +212,9 @@ def _draw_rests(axis: Axes, rests: list[_Rest]) -> None:
             axis.plot([x, x], span, color=colour, lw=2.0, transform=place, solid_capstyle="butt")
             caps = [end for end in (depth - half, depth + half) if low <= end <= high]
             axis.plot([x] * len(caps), caps, "_", color=colour, ms=8, mew=1.5, transform=place)
+            for end, beyond, mark in ((low, depth - half < low, "^"), (high, depth + half > high, "v")):
+                if beyond:  # depth grows downwards
+                    axis.plot(x, end, mark, color=colour, ms=7, transform=place, clip_on=False)
     axis.set_ylim(ends)
 
 

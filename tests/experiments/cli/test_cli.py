@@ -212,7 +212,7 @@ def test_an_option_that_a_command_has_not_is_answered_with_its_help_where_none_i
     text = capsys.readouterr().err
     assert "Did you mean" not in text and "`hedgebed fmu --help`" in text
     assert main(["fmu", "x.fmu", "--platfrom", "cubli"]) == 2
-    assert "Did you mean --platform?" in capsys.readouterr().err
+    assert "mean --platform?" in capsys.readouterr().err
 
 
 def test_no_help_shows_an_empty_default(capsys, monkeypatch):

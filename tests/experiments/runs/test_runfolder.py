@@ -85,7 +85,7 @@ def test_settings_that_would_not_read_back_are_refused(tmp_path):
     class Lossy(BaseModel):
         number: float = 0.0
 
-    with pytest.raises(ValueError, match="not give them back"):
+    with pytest.raises(ValueError, match="do not read back"):
         RunFolder.create(tmp_path / "a", "lossy", Lossy(number=float("nan")))
     assert not (tmp_path / "a").exists()
 
