@@ -2,7 +2,8 @@
 
 `Settings`, `check`, `run` and `resume` are those of `hedgebed compare`; calling one imports what computes.
 
-Imports `experiments.grains`, `experiments.platform`, `experiments.runs`, `experiments.spatial`, `rigid`, `vis.page`.
+Imports `experiments.grains`, `experiments.platform`, `experiments.runs`, `experiments.spatial`, `rigid`, `vis.page`,
+`vis.penetrate`.
 """
 
 from experiments.runs.registry import face
