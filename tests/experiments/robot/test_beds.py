@@ -24,6 +24,7 @@ from experiments.runs.progress import Progress
 from experiments.runs.result import Result
 from rigid.ground.laws import find_law
 from rigid.ground_file import GroundFile
+from rigid.intervals import NORMAL
 from vis.robot.beds import answer_tiles
 
 pytest.importorskip("mujoco", reason="mujoco is not installed: pip install 'hedgebed[mujoco]'")
@@ -234,7 +235,7 @@ def test_a_law_whose_numbers_have_no_range_says_that_its_error_is_not_known(give
     assert "sure" not in result and len([x for x in result.departures.sentences if "is not known" in x]) == 1
 
 
-def test_a_ground_file_gives_the_range_of_one_standard_deviation_of_its_parameters(tmp_path, monkeypatch):
+def test_a_ground_file_gives_the_range_of_95_per_cent_of_its_parameters(tmp_path, monkeypatch):
     monkeypatch.setattr("experiments.runs.whole_runs.write_report", lambda *_: None)
     values = find_law("spring-damper").values({"stiffness": 39.0, "damping": 0.16})
     file = GroundFile(
@@ -250,4 +251,4 @@ def test_a_ground_file_gives_the_range_of_one_standard_deviation_of_its_paramete
         for k, other in enumerate(moved(file)[0][1:])
     ]
     sure = result["sure"]["sinkage_largest"]
-    assert sure["high"] - sure["value"] == pytest.approx(abs(ends[0] - ends[1]) / 2, rel=1e-6)
+    assert sure["high"] - sure["value"] == pytest.approx(NORMAL * abs(ends[0] - ends[1]) / 2, rel=1e-6)
