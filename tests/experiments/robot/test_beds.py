@@ -235,11 +235,7 @@ def test_a_law_whose_numbers_have_no_range_says_that_its_error_is_not_known(give
     assert "sure" not in result and len([x for x in result.departures.sentences if "is not known" in x]) == 1
 
 
-<<<<<<< HEAD
 def test_a_ground_file_gives_the_range_of_the_95_percent_intervals_of_its_parameters(tmp_path, monkeypatch):
-=======
-def test_a_ground_file_gives_the_range_of_95_per_cent_of_its_parameters(tmp_path, monkeypatch):
->>>>>>> h-words
     monkeypatch.setattr("experiments.runs.whole_runs.write_report", lambda *_: None)
     values = find_law("spring-damper").values({"stiffness": 39.0, "damping": 0.16})
     file = GroundFile(
