@@ -296,4 +296,4 @@ def test_a_motion_whose_steps_become_too_short_to_end_is_refused_by_its_damping(
     """Found by the fuzzer: a damper of 2.5 million times critical, which round-off lets advance by nanoseconds."""
     (command, given), status, said, faults = computed(864)
     assert command == "hop" and given["damping"] == 1e9 and not faults
-    assert status == 2 and "cannot be followed beyond" in said and "C = 1e+09" in said
+    assert status == 2 and "followed beyond" in said and "C = 1e+09" in said
