@@ -34,7 +34,7 @@ _SHOWN = 3  # rivals that are compared
 _MOST = 3  # effects at once
 _BEST = 5  # single effects that are tried as a further one
 _PAIRS = 8  # pairs of effects that are fitted where no single effect suffices; of pushes and drops all are begun
-_PAIRS_STATED = 40  # and that are begun at the stated numbers, where the base model has bent its own
+_PAIRS_STATED = 24  # and that are begun at the stated numbers, where the base model has bent its own
 
 
 @dataclass(frozen=True)
@@ -172,11 +172,11 @@ class Search(CandidateFits):
         """Pairs begun at the stated numbers: those that follow the beginnings of the trials best.
 
         Numbers that the base model has bent already imitate what is missing, so the changes of effects that are added
-        there promise little.
+        there promise little. Of each pair all forms are begun.
         """
         model = self.base.fit.model
         stated = {p.name: p.value for p in model.parameters}
-        starts = pair_starts(model, stated, model.problem.forms, most=_PAIRS_STATED)
+        starts = pair_starts(model, stated, model.problem.forms, most=_PAIRS_STATED, every_form=True)
         models = [model.with_forms(start.forms) for start in starts]
         likeliest = contacts.race(models, [start.values for start in starts], most=_PAIRS)
         return self._begun(model, [replace(starts[place], values=values) for place, values in likeliest])

@@ -27,8 +27,9 @@ class Contacts:
 
 @pytest.mark.parametrize("strained", [True, False])
 def test_pairs_begin_at_the_stated_numbers_too_only_where_the_base_model_has_bent_its_own(monkeypatch, strained):
-    def starts(model, values, forms, *, most):
+    def starts(model, values, forms, *, most, every_form=False):
         place = {5.3: "stated", 5.36: "bent"}[values["mass"]]
+        assert every_form is (place == "stated")
         return [FormsStart((place, k), values) for k in range(most)]
 
     monkeypatch.setattr(search, "is_strained", lambda fit: strained)
