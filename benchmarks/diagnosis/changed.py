@@ -11,6 +11,7 @@ __all__ = ["CONSTANTS", "Constant", "begin_changed"]
 
 _PACKAGE = "experiments.diagnose"
 _FORMAT = "the rule of the format (docs/diagnose.md, What matters)"
+_SAND = "set on one campaign on sand, where the likeliest pairs are the 8th and 10th"
 _TUNED = "set on some seventy campaigns of our own simulators"
 
 
@@ -70,6 +71,7 @@ CONSTANTS = (
     Constant("core.search", "_SHARE_OF_BASE", "share of the base model's misfit that it removes", _TUNED),
     Constant("core.search", "_LEADS", "nats with prediction by which a rival takes the lead", "7 times likelier"),
     Constant("core.search", "_BESIDE", "nats behind the best within which a rival is compared", "cost only"),
+    Constant("core.search", "_PAIRS_STATED", "pairs begun at stated numbers that a base model has bent", _SAND),
     Constant("fit.evidence", "_MOST_OCCAM", "nats that a form's parameters cost at most", _TUNED),
     Constant("noise.wander", "_SURE", "twice the log likelihood of a wander of replicates", "chance 4e-8 (1 number)"),
     Constant("noise.replicates", "_SURE", "chance below which replicates differ", "chosen"),

@@ -9,7 +9,7 @@ from experiments.diagnose.fit.bounds import is_strained
 from experiments.diagnose.fit.evidence import SMALL, Hypothesis, excess
 from experiments.diagnose.fit.fitting import Fit, fit, fit_each
 from experiments.diagnose.fit.gate import Verdict
-from experiments.diagnose.fit.problem import Finding
+from experiments.diagnose.fit.problem import Contacts, Finding
 
 from .candidate_fits import FOLLOWED, WORTH, CandidateFits
 from .pairs import next_starts, pair_starts
@@ -34,6 +34,7 @@ _SHOWN = 3  # rivals that are compared
 _MOST = 3  # effects at once
 _BEST = 5  # single effects that are tried as a further one
 _PAIRS = 8  # pairs of effects that are fitted where no single effect suffices; of pushes and drops all are begun
+_PAIRS_STATED = 24  # and that are begun at the stated numbers, where the base model has bent its own
 
 
 @dataclass(frozen=True)
@@ -161,9 +162,24 @@ class Search(CandidateFits):
         """Pairs of effects, begun where projected changes promise most."""
         base = self.base.fit
         self.tell("trying pairs", 0.5)
-        if base.model.problem.contacts is None:  # a fit costs little: every pair
+        contacts = base.model.problem.contacts
+        if contacts is None:  # a fit costs little: every pair
             return self._in_all_forms()
-        return self._begun(base.model, pair_starts(base.model, base.values, base.model.problem.forms, most=_PAIRS))
+        begun = self._begun(base.model, pair_starts(base.model, base.values, base.model.problem.forms, most=_PAIRS))
+        return begun + self._pairs_stated(contacts) if is_strained(base) else begun
+
+    def _pairs_stated(self, contacts: Contacts) -> list[Hypothesis]:
+        """Pairs begun at the stated numbers: those that follow the beginnings of the trials best.
+
+        Numbers that the base model has bent already imitate what is missing, so the changes of effects that are added
+        there promise little. Of each pair all forms are begun.
+        """
+        model = self.base.fit.model
+        stated = {p.name: p.value for p in model.parameters}
+        starts = pair_starts(model, stated, model.problem.forms, most=_PAIRS_STATED, every_form=True)
+        models = [model.with_forms(start.forms) for start in starts]
+        likeliest = contacts.race(models, [start.values for start in starts], most=_PAIRS)
+        return self._begun(model, [replace(starts[place], values=values) for place, values in likeliest])
 
     def _swapped(self, best: Hypothesis) -> Hypothesis:
         """With one of its effects exchanged, where another promises more beside the rest."""

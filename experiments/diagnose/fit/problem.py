@@ -139,6 +139,10 @@ class Contacts(Protocol):
     def refine(self, models: Sequence[Model], values: Sequence[Values]) -> list[dict[str, float]]:
         """The same for several models of the same trials at once, all of whose values are given."""
 
+    def race(self, models: Sequence[Model], values: Sequence[Values], *, most: int) -> list[tuple[int, Values]]:
+        """Which of many models follow the beginnings of all trials best, at most `most`, the best first: each one's
+        place among `models`, and the values at which it does."""
+
 
 class Estimate(Protocol):
     """A fitted model, as a plan of further trials sees it (`fitting.Fit`)."""

@@ -92,6 +92,16 @@ class Guesser:
                 best[k] = min(best[k], more, key=lambda fit: fit.objective)
         return [{**here, **one.values} for one, here in zip(best, values, strict=True)]
 
+    def race(self, models: Sequence[Model], values: Sequence[Values], *, most: int) -> list[tuple[int, Values]]:
+        """Which models follow the beginnings best: see `Contacts`. Two growing horizons, each with some steps."""
+        running = list(enumerate(zip(map(self._coarse, models), values, strict=True)))
+        for share, going in zip(_GROWING[:-1], (2 * most, most), strict=True):
+            rule = replace(SEARCH, rounds=_ROUNDS, shares=(share,))
+            found = fits([(model, here, rule) for _, (model, here) in running])
+            order = sorted(range(len(found)), key=lambda k: found[k].objective)[:going]
+            running = [(running[k][0], (found[k].model, found[k].values)) for k in order]
+        return [(place, {**values[place], **found}) for place, (_, found) in running]
+
     def _base(self, model: Model, begun: Values) -> Fit:
         random = np.random.default_rng(0)
 
