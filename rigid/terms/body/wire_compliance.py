@@ -1,14 +1,14 @@
 """The rig's wires as springs: the counterweight no longer moves exactly as the platform does, upside down.
 
-The counterweight hangs at -b + const, b its descent; eta is the height of the shaft. The wires are stretched by s = b -
-eta beyond their stretch at rest, m_b g / k. There their tension is m_b g, whatever gravity_sim says: what (m - m_b) g
-differs from the weight is borne by the platform. In place of the rigid rig's m_b eta'^2 / 2
+The counterweight hangs at -b + const, b its descent; eta is the height of the shaft. The wires are stretched by
+s = b - eta beyond their stretch at rest, m_b g / k. There their tension is m_b g, whatever gravity_sim says: what
+(m - m_b) g differs from the weight is borne by the platform. In place of the rigid rig's m_b eta'^2 / 2
 
     T = m_b b'^2 / 2,  V = k s^2 / 2,  D = c s'^2 / 2,
 
 which gives m_b b'' = -(k s + c s'), and k s + c s' upwards on the shaft. A wire does not push: where the whole tension
-m_b g + k s + c s' would fall below zero the wires are slack. Counterweight and platform then fall separately, and V =
--m_b g s + const continues from there. They are taut again at full length, where their tension is positive.
+m_b g + k s + c s' would fall below zero the wires are slack. Counterweight and platform then fall separately, and
+V = -m_b g s + const continues from there. They are taut again at full length, where their tension is positive.
 """
 
 import math
