@@ -3,8 +3,8 @@
 A real effect never has exactly the library's form, so a model may be right in name and still leave what the sensors can
 see. Evidence that counts every sample as independent would then choose by details of form. Here what is left beyond the
 noise, E = chi-square - samples, is taken for slow modes of unknown size: with M such modes the log likelihood is
--(M / 2) ln(1 + E / M). It is -E / 2 while E is small, and falls only with the logarithm of the misfit when that is large (a
-variance of unknown scale integrated out). Laplace's factor for the parameters' volume is added to it.
+-(M / 2) ln(1 + E / M). It is -E / 2 while E is small, and falls only with the logarithm of the misfit when it is large
+(a variance of unknown scale integrated out). Laplace's factor for the parameters' volume is added to it.
 """
 
 import math
