@@ -221,13 +221,14 @@ def test_the_terminal_has_two_digits_of_each_number_millimetres_and_says_that_th
     assert "D / D" not in page and "0.16" in page
 
 
-def test_the_report_of_a_tumble_on_a_file_has_the_deviation_of_its_angle_and_of_every_number(tmp_path, capsys):
+def test_the_report_of_a_tumble_on_a_file_has_the_95_percent_error_of_its_angle_and_of_every_number(tmp_path, capsys):
     assert main(["ground", "--out", str(tmp_path / "run"), "--quiet"]) == DONE
     tumble = ["tumble", "--ground", str(tmp_path / "run" / "ground.toml"), "--duration", "1", "--rig", "0.0085"]
     assert main([*tumble, "--out", str(tmp_path / "tumble"), "--quiet"]) == DONE
     angle = json.loads((tmp_path / "tumble" / "result.json").read_text(encoding="utf-8"))["quantities"]
     value, std = (math.degrees(angle["trajectory_angle"][key]) for key in ("value", "std"))
-    assert re.search(rf"Trajectory angle +{value:.0f}° +none +{std:.0f}°", capsys.readouterr().out)
+    half = NORMAL * std
+    assert re.search(rf"Trajectory angle +{value:.0f}° +none +{half:.0f}°", capsys.readouterr().out)
     page = (tmp_path / "tumble" / "report.html").read_text(encoding="utf-8")
-    assert f">{value:.0f}°<" in page and f">{std:.0f}°<" in page
+    assert f">{value:.0f}°<" in page and f">{half:.0f}°<" in page
     assert "± law" in page and "no scatter" in page and ">std<" in page
