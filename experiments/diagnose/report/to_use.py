@@ -1,5 +1,6 @@
 """Which K and C of pushes and drops to use, in which law, and what their standard errors leave out."""
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -9,7 +10,7 @@ from vis.page.numbers import foldable, quote
 
 from .sentences import say
 
-__all__ = ["law_sentences", "number_words", "use_sentences"]
+__all__ = ["law_sentences", "number_words", "unloading_sentences", "use_sentences"]
 
 _NEUTRAL = 2.0  # standard errors within which a number is not distinguished from 0
 _STRONG, _PAIRS = 0.9, 3  # correlation from which on it is reported, and of how many pairs
@@ -80,9 +81,29 @@ def law_sentences(diagnosis: Mapping[str, Any]) -> list[str]:
         if entry["std"] and entry.get("determined", True) and abs(entry["value"]) < _NEUTRAL * entry["std"]
     ]  # fmt: skip
     said = [say("law", parts="; ".join(parts), reference=reference)]
+    said += unloading_sentences(diagnosis)
     said += [say("neutral", listed=", ".join(weak))] if weak else []
     pairs = _correlated(diagnosis.get("errors", {}))
     return said + ([say("correlated", listed=", ".join(pairs))] if pairs else [])
+
+
+def unloading_sentences(diagnosis: Mapping[str, Any]) -> list[str]:
+    """The stiffness of unloading K (1 + u) in N/m, with the error of both and their correlation.
+
+    None where u was not fitted, or K is of several diameters.
+    """
+    name, base = "plastic-sinkage.unload_stiffness", diagnosis["base"]["after"].get("stiffness")
+    errors = diagnosis.get("errors", {})
+    own = {effect["id"]: effect["parameters"] for effect in diagnosis["effects"]}.get("plastic-sinkage", {})
+    u, names = own.get("unload_stiffness"), list(errors.get("names", []))
+    if base is None or u is None or not u.get("determined", True) or {name, "stiffness"} - {*names}:
+        return []
+    places = [names.index("stiffness"), names.index(name)]
+    slopes = [(1 + u["value"]) * errors["std"][places[0]], base["value"] * errors["std"][places[1]]]
+    correlation = errors["correlation"][places[0]][places[1]]
+    std = math.sqrt(max(slopes[0] ** 2 + slopes[1] ** 2 + 2 * correlation * slopes[0] * slopes[1], 0.0))
+    stiffness = {"value": base["value"] * (1 + u["value"]), "std": std, "unit": "N/m"}
+    return [say("unloading", stiffness=number_words(stiffness))]
 
 
 def _correlated(errors: Mapping[str, Any]) -> list[str]:

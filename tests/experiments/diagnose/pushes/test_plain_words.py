@@ -6,6 +6,7 @@ import pytest
 from experiments.diagnose.push.remarks import Push, facts
 from experiments.diagnose.report.sentences import size_sentences
 from experiments.diagnose.report.summary import summary_sentences, title_words
+from experiments.diagnose.report.to_use import number_words, unloading_sentences
 
 SIZE = {"channel": "force", "unit": "N", "rms": 0.66, "most": 2.6, "share": 0.083}
 LARGE = SIZE | {"effect": "plastic-sinkage", "signature": 68.0, "own_force": None}
@@ -47,3 +48,19 @@ def test_a_foots_diameter_is_not_said_like_a_depth():
     pushes = [Push(0.02, z, np.full(20, 0.01), k * z, k * z) for k in (900.0, 1000.0)]
     (said,) = facts(pushes, [], is_open=False)
     assert "of diameter" in said and "how much pushes" not in said
+
+
+@pytest.mark.parametrize(("correlation", "error"), [(0.0, 500.0), (-1.0, 100.0), (1.0, 700.0)])
+def test_the_stiffness_of_unloading_is_stated_in_n_m_with_the_error_of_both_numbers(correlation, error):
+    """K (1 + u) = 1000 N/m; by K 10 x 40 = 400, by u 100 x 3 = 300 N/m: 500 together, 100 or 700 if as one."""
+    names = ["stiffness", "plastic-sinkage.unload_stiffness"]
+    unload = {"value": 9.0, "std": 3.0, "unit": "1"}
+    diagnosis = {
+        "base": {"after": {"stiffness": {"value": 100.0, "std": 40.0, "unit": "N/m"}}},
+        "effects": [{"id": "plastic-sinkage", "parameters": {"unload_stiffness": unload}}],
+        "errors": {"names": names, "std": [40.0, 3.0], "correlation": [[1.0, correlation], [correlation, 1.0]]},
+    }
+    (said,) = unloading_sentences(diagnosis)
+    assert number_words({"value": 1000.0, "std": error, "unit": "N/m"}) in said
+    diagnosis["errors"]["names"] = ["stiffness@0.012", names[1]]
+    assert unloading_sentences(diagnosis) == []
