@@ -1,7 +1,7 @@
 """How sure the answer of a robot's run is: on a law what its numbers leave open, over several beds their scatter.
 
-On a law the same robot runs again at both ends of what is known. K of the surface is one standard deviation lower and
-higher, or at the ends of its range. Of a ground file each uncertain parameter is moved by itself (`law_spread`).
+On a law the same robot runs again at both ends of what is known. K of the surface is at the ends of its 95 % interval,
+or of its range. Of a ground file each uncertain parameter is moved by itself (`law_spread`).
 """
 
 import math
@@ -86,7 +86,7 @@ def _of_stiffness(plan: RobotPlan, best: Answer, follow: Callable[[RobotPlan], A
         return _not_known(plan, say("k_given"))
     share = known.stiffness.std / known.stiffness.value if known is not None else 1.0
     if share < 1.0:
-        factors, how = (1 - share, 1 + share), {"key": "k_of_map", "share": share}
+        factors, how = _in_95(share)
     elif surface.stiffness_range is not None:
         low, high = surface.stiffness_range
         factors = (low / surface.stiffness, high / surface.stiffness)
@@ -100,6 +100,17 @@ def _of_stiffness(plan: RobotPlan, best: Answer, follow: Callable[[RobotPlan], A
     }
     key = str(how.pop("key"))
     return sure, say(key, surface=surface.name, words=in_words(sure, half=False), **how)
+
+
+def _in_95(share: float) -> tuple[tuple[float, float], Json]:
+    """Ends of the 95 % interval of K over its value, and how that is said. ``share``: its standard deviation over it.
+
+    Where the lower end would be 0 or less, which K cannot be, the upper end stands as a factor both ways.
+    """
+    half = NORMAL * share
+    if half < 1.0:
+        return (1 - half, 1 + half), {"key": "k_of_map", "share": half}
+    return (1 / (1 + half), 1 + half), {"key": "k_in_range", "factor": 1 + half}
 
 
 def _not_known(plan: RobotPlan, why: str) -> tuple[Json, str]:
