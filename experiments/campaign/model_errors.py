@@ -11,13 +11,27 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rigid.intervals import half_width
+
 from .tables import ERRORS_NOTE, PenetrationModel, TumbleModel
 
-__all__ = ["ModelErrors", "errors_of"]
+__all__ = ["ModelErrors", "errors_of", "is_biased"]
 
 Array = NDArray[np.float64]
 SHARE = 0.5
 """Part of a standard error by which a number is moved to either side."""
+
+
+_MATTERS = 0.01  # of a peak force: a bias below it is not reported
+
+
+def is_biased(peaks: Mapping[str, float]) -> bool:
+    """Whether a model is too low or too high at the deepest point of its pushes, by 1 % or more and beyond chance.
+
+    ``peaks``: a note `PEAKS_NOTE`. Chance: Student's 95 % interval of the mean over the pushes.
+    """
+    off = abs(float(peaks["mean"]) - 1.0)
+    return off > max(_MATTERS, half_width(float(peaks["std"]), int(peaks["trials"])) or 0.0)
 
 
 @dataclass(frozen=True)

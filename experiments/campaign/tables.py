@@ -23,6 +23,7 @@ __all__ = [
     "EffectTable",
     "ImuSensor",
     "PenetrationCampaign",
+    "PEAKS_NOTE",
     "PenetrationModel",
     "PenetrationSensors",
     "PenetrationSurface",
@@ -61,6 +62,9 @@ SCATTER_NOTE = "fitted_scatter"
 note: the campaign does not show it."""
 OTHERS_NOTE = "not_excluded"
 """A note of model.toml of pushes: `files` beside it, models of other forms that the trials do not exclude."""
+PEAKS_NOTE = "measured_over_model"
+"""A note of model.toml of pushes: the force where each was deepest, measured over modelled. `mean`, `std` and `trials`,
+`lowest` and `highest`."""
 NOTE_WORDS = {
     BASE_NOTE: "K [N/m] and C [N s/m] of the spring-damper alone, by diameter [m]",
     RANGE_NOTE: "the pushes that the model was fitted to",
@@ -68,6 +72,7 @@ NOTE_WORDS = {
     "these with all, a row for each",
     SCATTER_NOTE: "by what trials of one condition differ beyond the sensors, standard deviations: `bed` relative, of "
     "K and C; others in their unit",
+    PEAKS_NOTE: "force at the deepest reading of each push, measured over modelled",
     OTHERS_NOTE: "models of other forms that the trials do not exclude, beside this file: `penetrate --model` predicts "
     "with each",
 }

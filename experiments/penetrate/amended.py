@@ -20,8 +20,8 @@ from numpy.typing import ArrayLike, NDArray
 from coupling import Penetration, Run
 from experiments.campaign import PenetrationModel, read_model
 from experiments.campaign.files import MODEL_COPY
-from experiments.campaign.model_errors import ModelErrors, errors_of
-from experiments.campaign.tables import BASE_NOTE, RANGE_NOTE, SCATTER_NOTE, EffectTable
+from experiments.campaign.model_errors import ModelErrors, errors_of, is_biased
+from experiments.campaign.tables import BASE_NOTE, PEAKS_NOTE, RANGE_NOTE, SCATTER_NOTE, EffectTable
 from experiments.diagnose.fit.forms import OwnEffect, load_own
 from experiments.diagnose.push.forms import push_forms
 from experiments.diagnose.push.law import PHASES, SLOTS, fall, given_way, push, slot_places, slot_table
@@ -194,7 +194,7 @@ class AmendedLaw:
         drops = (*own.drop_speeds, *own.other_drop_speeds)
         if drops and spike.mass is not None and not math.isclose(spike.mass, own.mass, rel_tol=1e-3):
             said.append(say("other_mass", spike=spike, own=own))
-        said += self._beyond()
+        said += self._beyond() + self._off_at_peaks()
         driven, dropped, by_hand = self._speeds
         if by_hand or not (driven or dropped):
             return said
@@ -225,6 +225,18 @@ class AmendedLaw:
             else []
         )
         return said + ([] if covered.get("withdrawal", True) else [say("way_out_unseen")])
+
+    def _off_at_peaks(self) -> list[str]:
+        """That the model was too low or too high at the deepest point of the pushes that it was fitted to."""
+        peaks = self.model.notes.get(PEAKS_NOTE)
+        keys = ("mean", "lowest", "highest", "std", "trials")
+        if not isinstance(peaks, Mapping) or any(not isinstance(peaks.get(key), int | float) for key in keys):
+            return []
+        if not is_biased(peaks):
+            return []
+        mean, low, high = (100 * (peaks[key] - 1) for key in keys[:3])
+        told = {"side": "low" if mean > 0 else "high", "mean": mean, "low": low, "high": high}
+        return [say("peaks_off", trials=peaks["trials"], **told)]
 
     @property
     def fitted_to(self) -> str:

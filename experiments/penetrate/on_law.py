@@ -7,6 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+import numpy as np
+
 from coupling import Penetration, Run
 from experiments.campaign.files import keep_model
 from experiments.platform.ground_file import fitted_ground, with_kept_ground
@@ -38,6 +40,8 @@ __all__ = [
 MOST_STEPS_ON_LAW = 2e6
 """Of the spike on a law, in all runs: some minutes, and 200 MB of rows; no more are made."""
 
+_LOST = 0.9
+"""Share of the largest force of a push below which a law that falls further on is warned of."""
 _ROWS = 400
 """Macro steps in which the fastest run passes the driven depth, where no bed says how long a step is."""
 
@@ -223,11 +227,23 @@ def run_without_bed(settings: PenetrateSettings, folder: RunFolder, progress: Pr
             warnings=[
                 *law.warnings(),
                 *others.warnings,
+                *(text for unit in units if unit.kind == "driven" for text in _force_lost(runs[unit.id])),
                 *without_rest(settings, units, plain, "the spring-damper"),
                 *without_rest(settings, units, runs, f"the law with {law.words}"),
             ],
         )
         return publish(folder, made, progress)
+
+
+def _force_lost(run: Penetration) -> list[str]:
+    """That the force of a law falls by a tenth or more while the tip still goes deeper, in a sentence; else none."""
+    deepest = int(np.argmax(run.depth))
+    highest = int(np.argmax(run.force[: deepest + 1]))
+    high, low = float(run.force[highest]), float(run.force[highest : deepest + 1].min())
+    if low > _LOST * high:
+        return []
+    depths = [1e3 * float(run.depth[place]) for place in (highest, deepest)]
+    return [say("force_lost", high=high, low=low, at_mm=depths[0], to_mm=depths[1])]
 
 
 def _amended_entry(unit: Unit, plain: Penetration, run: Penetration) -> dict[str, object]:

@@ -4,7 +4,14 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from experiments.campaign import EffectTable, PenetrationCampaign, PenetrationModel
-from experiments.campaign.tables import BASE_NOTE, ERRORS_NOTE, OTHERS_NOTE, RANGE_NOTE, SCATTER_NOTE
+from experiments.campaign.tables import (
+    BASE_NOTE,
+    ERRORS_NOTE,
+    OTHERS_NOTE,
+    PEAKS_NOTE,
+    RANGE_NOTE,
+    SCATTER_NOTE,
+)  # fmt: skip
 
 from .data import Prepared
 from .parameters import comes_back, speeds_of
@@ -23,7 +30,7 @@ def model_of(
     the effects; `plain`: those of the base model that was fitted without effects, empty where there are none;
     `covered`: the range of the campaign's trials (`range_of`), noted; `errors`: of the fitted numbers, noted too;
     `scatter`: by what trials of one condition differ, noted where it is known."""
-    ours = (BASE_NOTE, RANGE_NOTE, ERRORS_NOTE, SCATTER_NOTE, OTHERS_NOTE)
+    ours = (BASE_NOTE, RANGE_NOTE, ERRORS_NOTE, SCATTER_NOTE, OTHERS_NOTE, PEAKS_NOTE)
     notes: dict[str, Any] = {name: note for name, note in tables.notes.items() if name not in ours}
     if errors:
         notes[ERRORS_NOTE] = dict(errors)

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from experiments.campaign import read_model, write_model
-from experiments.campaign.tables import OTHERS_NOTE
+from experiments.campaign.tables import OTHERS_NOTE, PEAKS_NOTE
 from experiments.diagnose.core.effect_texts import SYMBOLS, equations_of, with_comments
 from experiments.diagnose.core.near import Near, near_models, nearest_each
 from experiments.diagnose.core.outcome import Diagnosis, Estimated
@@ -42,6 +42,7 @@ from .sentences import candidate_rows
 __all__ = ["document", "write_diagnosis"]
 
 COUNTS = tomllib.loads(Path(__file__).with_name("counts.toml").read_text(encoding="utf-8"))
+_BESIDE = 2  # readings to either side of the deepest one, with which its force is averaged
 _ROUNDS = 8  # of refits without one of the effects
 _SIGNALS = ("force", "accel", "ax", "ay")  # channels that read 0 where nothing pushes: a change is a share of these
 
@@ -234,8 +235,12 @@ def write_diagnosis(folder: Path, found: Diagnosis) -> dict[str, Any]:
     if found.verdict == "unknown":
         write_series(folder / "latent.csv", found.latent())
     diagnosis["near_models"] = _write_near_models(folder, found, near)
-    others = [one["file"] for one in diagnosis["near_models"]]
-    diagnosis["errors"] = _write_model(folder / "model.toml", found, others)
+    notes: dict[str, Json] = {}
+    if (ratios := peak_ratios(found)) is not None:
+        diagnosis["peaks"] = notes[PEAKS_NOTE] = ratios
+    if others := [one["file"] for one in diagnosis["near_models"]]:
+        notes[OTHERS_NOTE] = {"files": others}
+    diagnosis["errors"] = _write_model(folder / "model.toml", found, notes)
     if rows := diagnosis["evidence"]:
         write_series(folder / "evidence.csv", {
             "candidate": [r["candidate"] for r in rows], "effects": [" + ".join(r["effects"]) for r in rows],
@@ -278,16 +283,34 @@ def write_diagnosis(folder: Path, found: Diagnosis) -> dict[str, Any]:
     return diagnosis
 
 
-def _write_model(path: Path, found: Diagnosis, others: Sequence[str] = ()) -> Json:
+def peak_ratios(found: Diagnosis) -> Json | None:
+    """Force at the deepest reading of each push, measured over modelled: mean, standard deviation, lowest, highest and
+    the number of `trials`, those held out too. None for fewer than three pushes."""
+    ratios = []
+    for trial in (*found.fitted, *found.held_out):
+        force = found.problem.compare(found.best_values, found.forms, trial).get("force", {})
+        if "depth_m" not in force or not np.isfinite(force["depth_m"]).any():
+            continue
+        near = slice(max((place := int(np.nanargmax(force["depth_m"]))) - _BESIDE, 0), place + _BESIDE + 1)
+        measured, modelled = (float(np.nanmean(force[name][near])) for name in ("measured", "model"))
+        if measured > 0 and modelled > 0:
+            ratios.append(measured / modelled)
+    if len(ratios) < 3:
+        return None
+    return {"mean": float(np.mean(ratios)), "std": float(np.std(ratios, ddof=1)), "lowest": min(ratios),
+            "highest": max(ratios), "trials": len(ratios)}  # fmt: skip
+
+
+def _write_model(path: Path, found: Diagnosis, notes: Mapping[str, Json] | None = None) -> Json:
     """Write the best model with its equations in comments, and return the errors of its numbers.
 
-    `others`: files beside it with other forms that the trials do not exclude, noted in a model of pushes.
+    `notes`: further ones of a model of pushes, by name.
     """
     errors = found.joint_errors()
     found.problem.write_model(str(path), found.best_values, found.forms, found.base_values, errors, found.known_scatter)
-    if others and found.problem.kind == "penetration":
+    if notes and found.problem.kind == "penetration":
         model = read_model(path)
-        write_model(path, model.model_copy(update={"notes": {**model.notes, OTHERS_NOTE: {"files": list(others)}}}))
+        write_model(path, model.model_copy(update={"notes": {**model.notes, **notes}}))
     text = with_comments(path.read_text(encoding="utf-8"), _equations(found), found.problem.kind)
     write_text(path, text)
     return errors

@@ -23,7 +23,7 @@ from .sentences import (
     unnamed_sentence,
     worse_sentences,
 )
-from .to_use import law_sentences, number_words, use_sentences
+from .to_use import law_sentences, number_words, peak_sentences, use_sentences
 
 __all__ = ["scatter_sentence", "summary_sentences", "title_words"]
 
@@ -63,7 +63,11 @@ def title_words(diagnosis: Mapping[str, Any]) -> str:
     if diagnosis["verdict"] == "named":
         return f"Missing: {names}"
     if diagnosis["verdict"] == "ambiguous":
-        return f"Missing: {names}, or {' or '.join(diagnosis['alternatives'])}: these trials cannot distinguish them"
+        others = " or ".join(diagnosis["alternatives"])
+        if len(diagnosis["effects"]) == 1 or small:
+            return f"Missing: {names}, or {others}: these trials cannot distinguish them"
+        first, *rest = (effect["id"] for effect in diagnosis["effects"])  # the alternatives are in place of the first
+        return f"Missing: {' and '.join(rest)}, and {first} or {others}: these trials cannot distinguish the last"
     if worsens_held_out(diagnosis):
         return "Unknown: something is missing; no effect of the library explains it with the values fitted here"
     if names:
@@ -103,7 +107,7 @@ def summary_sentences(diagnosis: Mapping[str, Any]) -> list[str]:
     aside = list(dict.fromkeys(row["trial"] for row in diagnosis.get("set_aside", [])))
     apart = [say("took_no_part", trials=", ".join(aside))] if aside else []
     use = [*use_sentences(diagnosis), *law_sentences(diagnosis)]
-    return [*_doubts(diagnosis), *_stated_far(diagnosis), *use, *apart, *first,
+    return [*_doubts(diagnosis), *_stated_far(diagnosis), *peak_sentences(diagnosis), *use, *apart, *first,
             *scatter_sentence(diagnosis), *_no_replicates(diagnosis),
             *near_model_sentences(diagnosis), f"Next experiment: {ask}"]  # fmt: skip
 

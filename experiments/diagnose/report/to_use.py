@@ -4,13 +4,14 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from experiments.campaign.model_errors import is_biased
 from experiments.diagnose.fit.gaps import numeral
 from vis.diagnose.usable import has_numbers_to_use, secant_depth
 from vis.page.numbers import foldable, quote
 
 from .sentences import say
 
-__all__ = ["law_sentences", "number_words", "unloading_sentences", "use_sentences"]
+__all__ = ["law_sentences", "number_words", "peak_sentences", "unloading_sentences", "use_sentences"]
 
 _NEUTRAL = 2.0  # standard errors within which a number is not distinguished from 0
 _STRONG, _PAIRS = 0.9, 3  # correlation from which on it is reported, and of how many pairs
@@ -85,6 +86,17 @@ def law_sentences(diagnosis: Mapping[str, Any]) -> list[str]:
     said += [say("neutral", listed=", ".join(weak))] if weak else []
     pairs = _correlated(diagnosis.get("errors", {}))
     return said + ([say("correlated", listed=", ".join(pairs))] if pairs else [])
+
+
+def peak_sentences(diagnosis: Mapping[str, Any]) -> list[str]:
+    """That the model is too low or too high where pushes are deepest, by more than chance; none where it is not."""
+    peaks = diagnosis.get("peaks")
+    if not peaks or not is_biased(peaks):
+        return []
+    ends = [f"{100 * (peaks[key] - 1):+.2g}" for key in ("lowest", "highest")]
+    side = "low" if peaks["mean"] > 1 else "high"
+    mean = f"{100 * (peaks['mean'] - 1):+.2g}"
+    return [say("peaks_off", trials=peaks["trials"], low=ends[0], high=ends[1], mean=mean, side=side)]
 
 
 def unloading_sentences(diagnosis: Mapping[str, Any]) -> list[str]:

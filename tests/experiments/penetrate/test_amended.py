@@ -10,7 +10,7 @@ from golden import golden
 
 from dem.grains.materials import Material
 from experiments.campaign import read_campaign
-from experiments.campaign.tables import BASE_NOTE, ERRORS_NOTE, OTHERS_NOTE, SCATTER_NOTE
+from experiments.campaign.tables import BASE_NOTE, ERRORS_NOTE, OTHERS_NOTE, PEAKS_NOTE, SCATTER_NOTE
 from experiments.cli.main import main
 from experiments.penetrate import beds
 from experiments.penetrate import experiment as penetrate
@@ -401,3 +401,28 @@ def test_the_spring_damper_beside_the_law_is_that_of_the_fit_without_effects(tmp
     assert rest["without"] == pytest.approx(0.1 / K, rel=0.01)
     said = {name: result["departures"]["sentences"][-1] for name, result in found.items()}
     golden("penetrate/compared", [said["with"], said["without"]])
+
+
+def test_a_model_that_is_too_low_at_the_peaks_of_its_own_pushes_warns_of_it(law):
+    note = f"[notes.{PEAKS_NOTE}]\nmean = 1.08\nlowest = 1.02\nhighest = 1.15\nstd = {{}}\ntrials = 10\n"
+    (said,) = [said for said in law(model=MODEL + note.format(0.04)).warnings() if "+2 to +15" in said]
+    assert "too low" in said and "10 pushes" in said and "+8 %" in said
+    for other in (note.format(0.2), note.format(0.04).replace("std", "stds"), ""):  # within chance; no such note
+        assert not [said for said in law(model=MODEL + other).warnings() if "too low" in said]
+
+
+def test_a_law_whose_force_falls_on_the_way_down_is_warned_of(tmp_path):
+    """K z (1 + a z / D) with a = -0.5 and D = 10 mm is largest at 10 mm, and a quarter less at 15."""
+    for name, quadratic, fell in (("falls", -0.5, True), ("rises", 0.5, False)):
+        effect = f"parameters = {{reference = 0.01, hardening_quadratic = {quadratic}}}\n"
+        (tmp_path / f"{name}.toml").write_text(MODEL + '[[effect]]\nid = "depth-hardening"\n' + effect)
+        settings = PenetrateSettings(
+            ground="spring-damper", model=str(tmp_path / f"{name}.toml"), depth=0.015, speeds=(0.01,), frame_count=0
+        )
+        warned = penetrate.run(settings, tmp_path / name).warnings
+        found = [said for said in warned if "falls from" in said]
+        assert bool(found) is fell
+        if fell:  # K z / 2 at 10 mm, K z / 4 at 15, and C v
+            high, at, low = map(float, re.findall(r"([0-9.]+) N at ([0-9.]+) mm to ([0-9.]+) N", found[0])[0])
+            assert high == pytest.approx(K * 0.005 + C * 0.01, rel=0.01) and at == pytest.approx(10.0, rel=0.02)
+            assert low == pytest.approx(K * 0.015 / 4, rel=0.02)

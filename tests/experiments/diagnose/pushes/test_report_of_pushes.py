@@ -4,6 +4,7 @@ import json
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -21,11 +22,11 @@ from experiments.diagnose.experiment import diagnose_campaign
 from experiments.diagnose.fit.evidence import Hypothesis
 from experiments.diagnose.fit.fitting import fit, settled
 from experiments.diagnose.push.remarks import Push, contradict, highest_damping
-from experiments.diagnose.report.document import COUNTS, _write_model, _write_near_models, document
+from experiments.diagnose.report.document import COUNTS, _write_model, _write_near_models, document, peak_ratios
 from experiments.diagnose.report.gaps import Gaps
 from experiments.diagnose.report.sentences import behind_words
 from experiments.diagnose.report.summary import summary_sentences
-from experiments.diagnose.report.to_use import use_sentences
+from experiments.diagnose.report.to_use import peak_sentences, use_sentences
 from experiments.diagnose.settings import DiagnoseSettings
 from rigid.series import read_series
 
@@ -251,7 +252,9 @@ def test_a_near_rival_has_a_model_of_its_own_and_a_far_one_has_none(diagnosed, t
         rows = _write_near_models(tmp_path, one, nearest_each(one))
         assert bool(rows) is written
         files = [row["file"] for row in rows]
-        _write_model(tmp_path / "model.toml", one, files)  # names them, so that `penetrate --model` predicts with each
+        _write_model(
+            tmp_path / "model.toml", one, {OTHERS_NOTE: {"files": files}} if files else {}
+        )  # names them, so that `penetrate --model` predicts with each
         assert read_model(tmp_path / "model.toml").notes.get(OTHERS_NOTE, {}).get("files", []) == files
         for row in rows:
             model = read_model(tmp_path / row["file"])
@@ -259,6 +262,32 @@ def test_a_near_rival_has_a_model_of_its_own_and_a_far_one_has_none(diagnosed, t
             stiffness = model.notes["fitted_by_diameter"]["0.06"]["stiffness"]
             again = settled(fit(rival.hypothesis.fit.model, rival.hypothesis.fit.values))
             assert stiffness == pytest.approx(again.values["stiffness@0.06"], rel=1e-6)
+
+
+def test_a_model_below_every_measured_peak_is_told_with_by_how_much():
+    """Four pushes, measured 4, 6, 8 and 10 % above the model at the deepest point; one without a depth is left out."""
+    depth = np.array([0.0, 0.5, 1.0, 1.0, 1.0, 1.0, 1.0, 0.5]) * 0.01
+
+    def compare(values, forms, trial):
+        if trial == "blind":
+            return {"force": {"measured": depth, "model": depth}}
+        return {"force": {"depth_m": depth, "model": 1e3 * depth, "measured": (1 + 0.01 * float(trial)) * 1e3 * depth}}
+
+    found = SimpleNamespace(
+        fitted=("4", "6", "blind"),
+        held_out=("8", "10"),
+        best_values={},
+        forms=(),
+        problem=SimpleNamespace(compare=compare),
+    )
+    peaks = peak_ratios(found)
+    assert (peaks["trials"], peaks["lowest"], peaks["highest"]) == (4, pytest.approx(1.04), pytest.approx(1.10))
+    assert peaks["mean"] == pytest.approx(1.07) and peaks["std"] == pytest.approx(0.0258, rel=1e-2)
+    (said,) = peak_sentences({"peaks": peaks})
+    assert "too low" in said and "+4 to +10" in said and "+7 %" in said
+    assert not peak_sentences({"peaks": peaks | {"std": 0.05}}) and not peak_sentences({})  # chance: 3.18 std / 2
+    found.held_out = ()
+    assert peak_ratios(found) is None
 
 
 def test_of_a_second_name_the_nearest_in_its_place_is_compared_by_prediction_too(diagnosed):
