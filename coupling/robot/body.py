@@ -409,7 +409,8 @@ class MujocoRobot:
                 return None
             highest = max(highest, height)
             if height < highest and low <= 0:
-                return highest - start, step * (count - low / min(low - above, -1e-300))
+                past = low / (low - above) if above > 0 else 0.0  # of the last step, where it crossed the surface in it
+                return highest - start, step * (count - past)
             above = low
         return None
 

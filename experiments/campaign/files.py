@@ -215,18 +215,20 @@ def write_model(path: str | Path, model: TumbleModel | PenetrationModel) -> None
     write_text(Path(path), _tables_toml(model))
 
 
-def keep_model(model: str | Path | None, folder: Path) -> Path | None:
+def keep_model(model: str | Path | None, folder: Path, name: str = MODEL_COPY) -> Path | None:
     """Copy a model.toml and the files of its effects into a run's folder, once; return the copy, None for no model.
+
+    ``name``: Of the copy.
 
     Raises ValueError as `read_model` does, and where a copy is damaged."""
     if model is None:
         return None
     source = Path(model)
-    if (copy := kept_copy(folder, MODEL_COPY)) is None:
+    if (copy := kept_copy(folder, name)) is None:
         for effect in read_model(source).effect:
             if effect.file is not None:
                 keep_given(folder, effect.file, (source.parent / effect.file).read_bytes())
-        copy = keep_given(folder, MODEL_COPY, source.read_bytes())
+        copy = keep_given(folder, name, source.read_bytes())
     return copy
 
 

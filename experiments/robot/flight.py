@@ -36,6 +36,8 @@ class Flights:
     """Whether the run ends in a flight."""
     longest: float
     """Duration of the longest [s], 0 without any."""
+    left: tuple[float, float, float] | None = None
+    """What is left of the flight that the end of the run cuts off, as of `at_end`."""
 
 
 def find_flights(run: RobotRun, heights: Array) -> Flights:
@@ -52,7 +54,8 @@ def find_flights(run: RobotRun, heights: Array) -> Flights:
     found = [(touched + low, touched + high) for low, high in spells(free[touched:]) if high - low >= lasting]
     rows = tuple((low, high) for low, high in found if lowest[low:high].max() > 0.0)
     longest = max((end - begin for begin, end in rows), default=0) * run.macro_step
-    return Flights(rows, touched, at_end=bool(rows) and rows[-1][1] == len(free), longest=longest)
+    cut = bool(rows) and rows[-1][1] == len(free)
+    return Flights(rows, touched, at_end=cut, longest=longest, left=at_end(run, heights) if cut else None)
 
 
 def launched(run: RobotRun, heights: Array, begin: int) -> list[str]:
@@ -67,8 +70,8 @@ def launched(run: RobotRun, heights: Array, begin: int) -> list[str]:
     return [say("launched", time=float(run.columns["time"][begin]), speed=speed, where=where)]
 
 
-def to_landing(run: RobotRun, heights: Array) -> str:
-    """How much longer a run must be that ends in the air, in a sentence.
+def to_landing(run: RobotRun, heights: Array, left: tuple[float, float, float] | None) -> str:
+    """How much longer a run must be that ends in the air, in a sentence. ``left``: as of `at_end`.
 
     ``heights``: of the lowest point of each foot at every row [m], shape (row, foot), as of
     `experiments.robot.feet.heights_of`.
@@ -76,7 +79,7 @@ def to_landing(run: RobotRun, heights: Array) -> str:
     gravity, height, speed = run.robot.gravity, max(0.0, float(heights[-1].min())), float(_upwards(run)[-1])
     if run.robot.hangs or (gravity <= 0 and speed >= 0):
         return say("no_landing")
-    end, left = float(run.columns["time"][-1]), at_end(run, heights)
+    end = float(run.columns["time"][-1])
     fall = -height / speed if left is None else left[2]
     return say("landing", fall=fall, height=1e3 * height, wanted=_above(end + fall))
 

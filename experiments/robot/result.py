@@ -298,10 +298,9 @@ def _ballistic(run: RobotRun, heights: Array, flights: Flights, found: Mapping[s
 
     The lowest points of the feet are taken to rise as the centre of mass does.
     """
-    left = at_end(run, heights) if flights.at_end else None
-    if left is None:
+    if flights.left is None:
         return {}
-    rise, _, fall = left
+    rise, _, fall = flights.left
     rows, (begin, end) = run.columns, flights.rows[-1]
     reached = {
         "highest": float(rows["z"][-1] - rows["z"][0]) + rise,
@@ -318,7 +317,7 @@ def _ballistic(run: RobotRun, heights: Array, flights: Flights, found: Mapping[s
 
 def _cut_off(run: RobotRun, heights: Array, flights: Flights) -> str:
     """The warning of a run that ends in a flight, in a sentence."""
-    left, landing = at_end(run, heights), to_landing(run, heights)
+    left, landing = flights.left, to_landing(run, heights, flights.left)
     if left is None:
         return say("airborne_for_ever", landing=landing)
     return say("airborne", speed=left[1], so_far=1e3 * _highest(run, flights.touched), landing=landing)
@@ -328,7 +327,7 @@ def _sentences(run: RobotRun, heights: Array, flights: Flights) -> list[str]:
     """What happened, in words."""
     rows, flown, touched = run.columns, flights.rows, flights.touched
     if touched is None:
-        return [f"{say('touches_nothing')} {to_landing(run, heights)}."]
+        return [f"{say('touches_nothing')} {to_landing(run, heights, at_end(run, heights))}."]
     way = float(np.hypot(rows["x"][-1] - rows["x"][0], rows["y"][-1] - rows["y"][0]))
     rise = 1e3 * _highest(run, touched)
     rose = say("rose", rise=rise) if rise >= 0 else say("stayed_below", rise=-rise)

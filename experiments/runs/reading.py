@@ -17,7 +17,7 @@ from pydantic_core import ErrorDetails
 from experiments.runs.folder import RUN_FORMATS, settings_in
 from experiments.runs.strict import may_be_empty
 from experiments.runs.units import find_unit, in_both
-from rigid.checks import nearest, why_unread
+from rigid.checks import alike, nearest
 
 __all__ = ["Layer", "find_case", "gravities_told", "option", "read_case", "settings_from"]
 
@@ -58,8 +58,8 @@ def find_case(given: Path, shipped: Path, commands: Iterable[str] = ()) -> Path:
     if meant := get_close_matches(str(given), list(commands), n=1):
         raise ValueError(f"{str(given)!r} is neither a command nor a file; did you mean {meant[0]!r}?")
     own = given if given.suffix else given.with_suffix(".toml")
-    if "did you mean" in (why := why_unread(own, FileNotFoundError())):
-        raise ValueError(f"case = {str(given)!r}: {why}")
+    if own.parent.is_dir() and (meant_file := alike(own)):
+        raise ValueError(f"case = {str(given)!r}: there is no such file{meant_file}")
     names = sorted(path.stem for path in shipped.glob("*.toml"))
     below = sorted(path.stem for path in shipped.glob("*/*.toml"))
     if close := get_close_matches(given.name.removesuffix(".toml"), [*names, *below], n=_NEAR):

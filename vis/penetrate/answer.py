@@ -12,7 +12,7 @@ from rigid.intervals import half_width
 from vis.page.numbers import between, plain, quantity, quote, split_spread, within
 from vis.page.page import Tile
 from vis.penetrate import summary_parts as words
-from vis.penetrate.errors import half_of, in_95
+from vis.penetrate.errors import contains_beds, half_of, in_95
 from vis.penetrate.summary_parts import NBSP, say
 
 __all__ = ["answer_tiles", "grains_of", "largest_force", "peaks_of", "rests_at", "words_of_effects"]
@@ -240,9 +240,13 @@ def _of_model(result: Entries) -> list[Tile]:
     pushes = [name for name in numbers if name.startswith("peak_force_amended")]
     pushes = [pushes[0], pushes[-1]] if len(pushes) > 1 else pushes
     rows: list[tuple[str, str, str, str | None]] = [
-        (f"Peak force{_without_beds(numbers[name])}, {_path(numbers[name])}", name, other, None)
+        (
+            f"Peak force{_without_beds(numbers[name])}, {_path(numbers[name])}",
+            name,
+            name.replace("amended", "spring_damper"),
+            None,
+        )
         for name in pushes
-        for other in [name.replace("amended", "spring_damper")]
     ]
     load = f" under {quantity(numbers['load'])}" if "load" in numbers else ""
     rows += [
@@ -281,8 +285,7 @@ def _over_forms(result: Entries, numbers: Entries, name: str) -> list[Tile]:
 
 def _without_beds(entry: Entries) -> str:
     """That the error of a peak force leaves out by what beds differ, where it does."""
-    known = entry.get("std") is None or "scatter of the beds" in str(entry.get("note", ""))
-    return "" if known else " (± without beds)"
+    return "" if entry.get("std") is None or contains_beds(entry) else " (± without beds)"
 
 
 def _path(entry: Entries) -> str:

@@ -14,7 +14,7 @@ from rigid.intervals import NORMAL, half_width, student
 from vis.page.numbers import quantity, quote
 from vis.penetrate.summary_parts import fit_error, joined, list_of, mapping_of, say, std_of, value_of
 
-__all__ = ["error_words", "fit_part", "fitted", "half_of", "half_of_fit", "in_95"]
+__all__ = ["contains_beds", "error_words", "fit_part", "fitted", "half_of", "half_of_fit", "in_95"]
 
 _UNITS = {"stiffness": "N/m", "damping": "N s/m"}
 
@@ -55,8 +55,12 @@ def half_of(entry: Mapping[str, Any]) -> float | None:
 def error_words(result: Mapping[str, Any]) -> str:
     """What ± is in a result on the law of a model: half of a 95 % interval, with or without the scatter of beds."""
     peaks = [entry for name, entry in mapping_of(result.get("quantities")).items() if name.startswith("peak_force_am")]
-    known = any("scatter of the beds" in str(mapping_of(entry).get("note", "")) for entry in peaks)
-    return say("half_of_95_with_beds" if known else "half_of_95")
+    return say("half_of_95_with_beds" if any(map(contains_beds, peaks)) else "half_of_95")
+
+
+def contains_beds(entry: Any) -> bool:
+    """Whether the error of a peak force contains by what beds differ, by its note."""
+    return "scatter of the beds" in str(mapping_of(entry).get("note", ""))
 
 
 def fitted(numbers: Mapping[str, Any], key: str) -> str:

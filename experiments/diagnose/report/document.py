@@ -236,7 +236,7 @@ def write_diagnosis(folder: Path, found: Diagnosis) -> dict[str, Any]:
         write_series(folder / "latent.csv", found.latent())
     diagnosis["near_models"] = _write_near_models(folder, found, near)
     notes: dict[str, Json] = {}
-    if (ratios := peak_ratios(found)) is not None:
+    if problem.kind == "penetration" and (ratios := peak_ratios(found)) is not None:
         diagnosis["peaks"] = notes[PEAKS_NOTE] = ratios
     if others := [one["file"] for one in diagnosis["near_models"]]:
         notes[OTHERS_NOTE] = {"files": others}

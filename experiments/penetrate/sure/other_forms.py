@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Protocol
 
 from coupling import Penetration
-from experiments.campaign import PenetrationModel, read_model
+from experiments.campaign import PenetrationModel
+from experiments.campaign.files import keep_model
 from experiments.campaign.tables import OTHERS_NOTE
-from experiments.runs.given import keep_given, kept_copy
 from experiments.runs.types import Json
 
 from .peak import Law, peak_error, peak_of, say
@@ -59,7 +59,8 @@ def kept_others(law: FileLaw, source: Path, folder: Path, read: Callable[[Path],
     """
     laws, absent = {}, []
     for file in _named(law.model):
-        if _keep(source, file, folder):
+        if (folder / file).exists() or (source / file).is_file():
+            keep_model(source / file, folder, file)
             laws[file] = read(folder / file)
         else:
             absent.append(file)
@@ -72,16 +73,3 @@ def _named(model: PenetrationModel) -> tuple[str, ...]:
     files = note.get("files", ()) if isinstance(note, Mapping) else ()
     texts = [file for file in files if isinstance(file, str)] if isinstance(files, Sequence) else []
     return tuple(file for file in texts if Path(file).name == file and file.endswith(".toml"))
-
-
-def _keep(source: Path, file: str, folder: Path) -> bool:
-    """Copy a model and the files of its effects into a run's folder, once; False where there is no such model."""
-    if kept_copy(folder, file) is not None:
-        return True
-    if not (source / file).is_file():
-        return False
-    own = [effect.file for effect in read_model(source / file).effect if effect.file is not None]
-    for name in (*own, file):
-        if kept_copy(folder, name) is None:
-            keep_given(folder, name, (source / name).read_bytes())
-    return True

@@ -86,6 +86,9 @@ def test_a_flight_on_a_rail_with_damping_goes_on_as_mujoco_has_it(tmp_path):
     assert v**2 / (2 * g) > 1.4 * rise
     assert robot.data.time == 0.0 and robot.data.qvel[0] == v and fall > 0
     assert robot.onward(most_steps=100) is None
+    robot.data.qpos[0], robot.data.qvel[0] = -0.01, -0.1  # it falls in its crater, below the surface already
+    robot.start()
+    assert robot.onward() == (0.0, pytest.approx(1e-3))  # one step
 
 
 def test_a_robot_that_is_still_falling_at_the_end_is_told_of_it_before_and_a_run_of_that_length_touches(
