@@ -57,9 +57,9 @@ ERRORS_NOTE = "fitted_errors"
 """A note of model.toml: `names` of the fitted numbers (``stiffness``, ``effect.parameter``), their standard errors
 `std` and `correlation`, rows in the order of `names`; `undetermined`: names of those without a standard error."""
 SCATTER_NOTE = "fitted_scatter"
-"""A note of model.toml of pushes: by what replicates differ beyond the sensors, standard deviations: `bed` and
-`bed damping` relative, of K and C; channels and zeros in their unit. `trials` and `freedom`: what it was found from. No
-note: the campaign does not show it."""
+"""A note of model.toml of pushes: by what replicates differ beyond the sensors, standard deviations: `bed` relative, of
+K and C, `bed damping` of C and `bed unloading` of the stiffness of the way back; channels and zeros in their unit.
+`trials` and `freedom`: what it was found from. No note: the campaign does not show it."""
 OTHERS_NOTE = "not_excluded"
 """A note of model.toml of pushes: `files` beside it, models of other forms that the trials do not exclude."""
 PEAKS_NOTE = "measured_over_model"
@@ -71,7 +71,7 @@ NOTE_WORDS = {
     ERRORS_NOTE: "standard errors of the fitted numbers, in the order of `names`, and the correlations of each of "
     "these with all, a row for each",
     SCATTER_NOTE: "by what trials of one condition differ beyond the sensors, standard deviations: `bed` relative, of "
-    "K and C; others in their unit",
+    "K and C, `bed damping` of C, `bed unloading` of the stiffness of the way back; others in their unit",
     PEAKS_NOTE: "force at the deepest reading of each push, measured over modelled",
     OTHERS_NOTE: "models of other forms that the trials do not exclude, beside this file: `penetrate --model` predicts "
     "with each",

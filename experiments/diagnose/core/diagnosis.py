@@ -32,6 +32,7 @@ _DRAWS, _REFITS = 600, 400  # synthetic campaigns of a null, and of a thorough o
 _MARGIN = 1.5  # standard deviations beyond the gate that something unknown must reach, as no effect supports it
 _MOST_LEFT = 2.5  # chi-square a sample up to which an effect is near enough to the motion to weight rows by it
 _ON = 1.0  # chi-square by which a fit must improve to be taken instead
+_HARDLY = 1e-3  # share of what was left, below which other kinds of scatter have nothing to explain
 _NO_MOTION = 0.5  # share of what the base model leaves, below which an effect describes the motion
 
 
@@ -63,8 +64,7 @@ class _Asked:
     gates: Path | None
     aside: Sequence[Finding] = ()  # fitted trials that are to take no part (`noise.diverging`)
     looked_at: Sequence[str] = ()  # trials that must not be held out, as the base model explains all but these
-    with_wander: bool = False
-    """Whether the wander of replicates counts as noise, which tests an effect beside something unknown."""
+    with_wander: bool = False  # the wander of replicates counts as noise: a test beside something unknown
     begun: _Begun | None = None  # from an earlier course of the same campaign
     patient: bool = False  # search further effects before trials may diverge
 
@@ -86,7 +86,7 @@ class _Course:
         self.model_std: Mapping[str, float] = {}
         self.alone: Fit | None = None  # the base model's fit as its own weights have it
         self.known: dict[str, Values] = {}  # where forms ended alone in the searches so far
-        self.pairs: tuple[FormsStart, ...] = ()  # and pairs
+        self.pairs: dict[frozenset[str], tuple[FormsStart, ...]] = {}  # and pairs, beside these kinds of scatter
 
     def run(self) -> Diagnosis:
         """All steps; some findings begin the course anew."""
@@ -108,8 +108,8 @@ class _Course:
             if self.first.passed:
                 return self._nothing()
         for step in (
-            self._reweighed, self._scattered, self._scattered_beside, self._scattered_alone, self._timed,
-            self._recoloured_choice, self._doubted,
+            self._reweighed, self._scattered, self._scattered_beside, self._scattered_alone, self._reweighed,
+            self._timed, self._recoloured_choice, self._doubted,
         ):  # fmt: skip
             choice = step(choice)
         if asked.thorough and choice.best.effects:
@@ -195,24 +195,25 @@ class _Course:
         return diverging_trials(found, self.held_out, seed=self.asked.seed, recoloured=self._recoloured)
 
     def _chosen(self, *, may_diverge: bool = False) -> Choice:
-        """A search from the base model, which may find a better fit of that, too. `may_diverge`: whether it stops where
-        trials diverge from the base model or the best single effect."""
+        """A search, which may find a better base model. `may_diverge`: it stops where trials diverge from the best."""
 
         def diverging(base: Fit, best: Fit) -> tuple[Finding, ...]:
             return self._diverging(base) or (self._diverging(best) if best.model.forms else ())
 
+        kinds = frozenset(p.kind for p in self.base.model.scatter)
+        find, pairs = diverging if may_diverge else None, self.pairs.get(kinds, ())
         search = Search(self.base, tell=self.tell, seed=self.asked.seed, recoloured=self._recoloured, known=self.known,
-                        known_pairs=self.pairs, find_diverging=diverging if may_diverge else None)  # fmt: skip
+                        known_pairs=pairs, find_diverging=find)  # fmt: skip
         choice = search.choose()
-        self.known, self.pairs = self.known | search.alone, search.pairs
+        self.known, self.pairs[kinds] = self.known | search.alone, search.pairs
         if not choice.diverging:
             self.base = choice.base.fit
         return choice
 
     def _reweighed(self, choice: Choice) -> Choice:
-        """With rows weighted by the best model: the effect of a path's error on a force depends on the model."""
+        """With rows weighted by the best model, once one is near enough: what a path's error does depends on it."""
         best = choice.best
-        if self.asked.with_wander or not (best.effects and self.problem.by_path):
+        if self.alone is not None or self.asked.with_wander or not (best.effects and self.problem.by_path):
             return choice
         if best.fit.chi_square > _MOST_LEFT * best.fit.count or not self._describes_motion(best):
             return choice
@@ -250,10 +251,10 @@ class _Course:
         """Where something is left, replicates are compared by what each has of its own."""
         if not self._compares(choice):
             return choice
-        fits, named = (choice.best.fit, choice.base.fit), choice.left.passed
+        fits, named, little = (choice.best.fit, choice.base.fit), choice.left.passed, _HARDLY * choice.left.score
         later = [kinds for kinds in (self.problem.zero_scatter, self.problem.force_scatter) if kinds]
         for kinds, beside in itertools.product(((), *later), fits[1:] if named else fits):
-            if choice.left.passed and not named:
+            if not named and (choice.left.passed or choice.left.score < little):
                 break
             scatter = renoised.scatter_of(beside, self.held_out, apart=True, kinds=kinds)
             if not scatter.parameters or set(scatter.model_std) == set(self.model_std):
@@ -370,8 +371,7 @@ class _Course:
 
     def _moved(self, choice: Choice, best: Fit) -> Choice:
         """The base model's fit and the best one as they are now; scores stay those by which all were compared."""
-        left = open_gate(best, seed=self.asked.seed)[1]
-        base = replace(choice.base, fit=self.base)
+        base, left = replace(choice.base, fit=self.base), open_gate(best, seed=self.asked.seed)[1]
         return replace(choice, base=base, best=replace(choice.best, fit=best), left=left)
 
     def _decided(self, choice: Choice) -> Diagnosis:
@@ -486,8 +486,8 @@ class _Course:
         """The gate on trials that took no part, with the scatter of replicates where it was found."""
         if not self.held_out:
             return None
-        values = held_out_fit(found.model, self.held_out, found.values)
-        return held_out_gate(found, self.held_out, values, seed=self.asked.seed)
+        own = held_out_fit(found.model, self.held_out, found.values)
+        return held_out_gate(found, self.held_out, own, seed=self.asked.seed)
 
     def _looking_at(self, others: tuple[str, ...]) -> Diagnosis:
         """The whole course once more with the held-out trials `others` fitted, and other ones held out."""

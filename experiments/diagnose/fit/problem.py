@@ -254,6 +254,10 @@ class Problem(Protocol):
         """The moment [s] up to which the model follows a trial; None where that is no good part of it."""
         return None
 
+    def centred(self, values: Values, forms: Sequence[Form]) -> dict[str, float]:
+        """The same model, what trials' own numbers have in common moved into shared ones: a fit goes on from there."""
+        return dict(values)
+
     def shake(self, along: Mapping[str, Array]) -> None:
         """Take times that jitter into the whitening from now on.
 

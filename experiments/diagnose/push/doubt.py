@@ -1,5 +1,7 @@
 """What the error of a smoothed depth leaves in doubt of a driven trial's force: at the surface, and where it turns."""
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,12 +11,19 @@ from experiments.grains.spells import spells
 from .data import Prepared
 from .depth import SmoothDepth
 
-__all__ = ["off_rest", "off_surface", "path_error", "reversing", "touching", "turning"]
+__all__ = ["bounded", "off_rest", "off_surface", "path_error", "reversing", "touching", "turning"]
 
 _BESIDE = 5  # rows before and after a turn that show the force there
 _AT_TURN = 6
 """Rows that a turn may last; where a spike is slow for longer it is held, or eased, and its direction is what it is."""
 _AT_END = 2  # rows at either end of a hold in which the motion may not have stopped, or may have begun again
+_FAILED = 1e3  # residual over the noise where a model is no number
+
+
+def bounded(rest: Array) -> Array:
+    """Residuals over the noise that a sum of squares can hold."""
+    near = np.clip(rest, -1e5, 1e5)
+    return near if math.isfinite(float(rest.sum())) else np.where(np.isfinite(rest), near, _FAILED)
 
 
 def path_error(smooth: SmoothDepth, by_depth: Array, by_row: Array) -> Array:

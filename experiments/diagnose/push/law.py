@@ -56,11 +56,12 @@ _LIBRARY = tuple(
 SLOTS = (
     "mass", "gravity", "stiffness", "damping", "reference", "speed_scale", "radius_depth",
     *(slot for effect in _LIBRARY for slot in _slots_of(effect)), "shift_depth", "shift_row", "shift_speed",
-    "given_way",
+    "given_way", "unload_change",
 )  # fmt: skip
 """Numbers of a lane, in order. `radius_depth`: depth at which the tip is wholly in; `speed_scale`: below it the
 direction of a driven spike is not certain; shifts: added to a driven spike's path, for derivatives (`shift_row`: to the
-depth of each row alone, with its history unchanged); `given_way`: permanent sinkage of the bed before the push [m]."""
+depth of each row alone, with its history unchanged); `given_way`: permanent sinkage of the bed before the push [m];
+`unload_change`: of K where the way back has a stiffness of its own, relative."""
 PHASES = ("free", "in", "rest", "out")
 
 _SLOT = {name: place for place, name in enumerate(SLOTS)}
@@ -280,6 +281,7 @@ def _functions(own: _Own) -> tuple[int, Any, Any, Any, Any]:
     ) = _changes(own)  # fmt: skip
     OWN = any(law is None for _, law in own)
     MASS, GRAVITY, STIFFNESS, DAMPING = (_SLOT[name] for name in ("mass", "gravity", "stiffness", "damping"))
+    UNLOAD_CHANGE = _SLOT["unload_change"]
     REFERENCE, RADIUS_DEPTH, HELD, REACH = (_SLOT[name] for name in ("reference", "radius_depth", _HELD, _REACH))
 
     @ti.func
@@ -302,7 +304,7 @@ def _functions(own: _Own) -> tuple[int, Any, Any, Any, Any]:
         if z > 0.0:
             most, ever = ti.max(top, z), ti.max(deepest, z)
             # Where the loading curve is read, what is taken off it, and by how much it bends.
-            at, stiff, bent = unload_changed(z, ever, n[k, STIFFNESS], n, k)
+            at, stiff, bent = unload_changed(z, ever, n[k, STIFFNESS] * (1.0 + n[k, UNLOAD_CHANGE]), n, k)
             spring = ti.max(loading(at - gone, n, k) * bent - stiff, 0.0)
             if ti.static(OWN):
                 s = State(mass=n[k, MASS], gravity=n[k, GRAVITY], weight=n[k, MASS] * n[k, GRAVITY], y=-z, vy=-v)

@@ -1,4 +1,4 @@
-"""What is fitted of pushes and drops beside effects: K and C by diameter, and what may differ from trial to trial."""
+"""What is fitted of pushes and drops beside effects: K and C by diameter; and what is typical of a campaign."""
 
 import math
 from collections.abc import Sequence
@@ -8,14 +8,10 @@ import numpy as np
 from experiments.campaign import PenetrationCampaign
 from experiments.diagnose.fit.problem import Array, Parameter
 
-from .data import Prepared, stds
+from .data import Prepared
 from .forms import Scales
 
-__all__ = ["base_parameters", "comes_back", "diameters_of", "find_scales", "named", "scatter_parameters", "speeds_of"]
-
-_ZERO_DEPTH = 0.1  # how far a depth's zero may differ between pushes while it is asked whether it does, over D
-_LEAST_ZERO = 0.2  # zeros that differ by less than this share of the noise are negligible
-_BED_STD = 0.5  # how far the bed may differ between replicates while it is asked whether it does [1]
+__all__ = ["base_parameters", "comes_back", "diameters_of", "find_scales", "named", "speeds_of"]
 
 
 def diameters_of(trials: Sequence[Prepared]) -> list[float]:
@@ -51,35 +47,6 @@ def base_parameters(tables: PenetrationCampaign, trials: Sequence[Prepared]) -> 
                 step=1e-4 * max(start, size),
             ))  # fmt: skip
     return tuple(found)
-
-
-def scatter_parameters(
-    tables: PenetrationCampaign, trials: Sequence[Prepared], scales: Scales
-) -> dict[str, tuple[Parameter, ...]]:
-    """What may differ between replicates beyond the sensors: kind -> one nuisance a trial, mostly not fitted.
-
-    A factor on K and C, and one on C alone; of pushes where the depth is counted from, and what the force reads
-    at none.
-    """
-    ids, pushes = ([t.info.id for t in trials if t.driven or not driven] for driven in (False, True))
-    found = {
-        kind: Parameter(
-            name=kind, unit="1", value=0.0, std=_BED_STD, scale=0.02, lowest=-0.95, highest=5.0, step=1e-4
-        ).in_each(ids)
-        for kind in ("bed", "bed damping")
-    }
-    if not pushes:
-        return found
-    far = _ZERO_DEPTH * scales.depth
-    force = far * scales.force / scales.depth
-    for kind, unit, end, noise in zip(
-        ("depth zero", "force zero"), ("m", "N"), (far, force), stds(tables, True), strict=True
-    ):
-        found[kind] = Parameter(
-            name=kind, unit=unit, value=0.0, std=end, scale=0.1 * max(end, 1e-12), lowest=-2 * end, highest=2 * end,
-            step=1e-3 * end, least=_LEAST_ZERO * noise,
-        ).in_each(pushes)  # fmt: skip
-    return found
 
 
 def _straight_stiffness(tables: PenetrationCampaign, trials: Sequence[Prepared], diameter: float) -> float:

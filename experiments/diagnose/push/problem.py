@@ -9,7 +9,6 @@ start and scored on depth and acceleration.
 from __future__ import annotations
 
 import hashlib
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -34,21 +33,21 @@ from experiments.diagnose.fit.problem import (
 )
 from experiments.diagnose.noise.jitter import Shaken
 
+from .beds import centred, scatter_parameters
 from .data import Prepared, of_drop, prepare, stds, tip_depth
 from .depth import SmoothDepth
 from .design import best_push
-from .doubt import off_rest, off_surface, path_error, reversing, touching, turning
+from .doubt import bounded, off_rest, off_surface, path_error, reversing, touching, turning
 from .forms import physical, push_forms, unit_of
 from .law import PHASES, SLOTS, fall, push, slot_places, slot_table
 from .model_file import Pairs, model_of, range_of
-from .parameters import base_parameters, comes_back, diameters_of, find_scales, named, scatter_parameters, speeds_of
+from .parameters import base_parameters, comes_back, diameters_of, find_scales, named, speeds_of
 from .remarks import SURE, Push, contradict, facts, highest_dampings, how_to_determine
 from .zeros import find_force_zeros
 
 __all__ = ["PenetrationProblem", "make_problem"]
 
 _SLOT = {name: place for place, name in enumerate(SLOTS)}
-_FAILED = 1e3
 _SHALLOW = 0.02  # share of D that counts as just below the surface
 
 
@@ -69,7 +68,7 @@ class PenetrationProblem(Problem):
     whole = "the bed or the tip"
     clocks = (("force",), ("depth", "accel"))
     by_path = True
-    hidden_scatter = ("bed damping",)  # comes near to what a speed does
+    hidden_scatter = ("bed damping", "bed unloading")  # near to what a speed does, and to what a depth does
     zero_scatter = ("bed", "depth zero")  # at one speed a damper and a depth's zero are the same
     force_scatter = ("force zero",)  # of pushes that begin at the surface, where no row reads it
     lone_scatter = (("bed", "depth zero"), ("bed", "bed damping"), ("force zero",))  # K may differ, and not C
@@ -138,11 +137,12 @@ class PenetrationProblem(Problem):
             into[:, _SLOT["speed_scale"]] = max(0.02 * fast, 2 * float(np.median(trial.smooth.speed_std)), 1e-12)
         size, (k, stated_k) = trial.diameter / self._middle, self._stated("stiffness", trial.diameter)
         c, stated_c = self._stated("damping", trial.diameter)
-        own = [f"{kind}[{trial.info.id}]" for kind in ("bed", "bed damping", "depth zero")]
+        own = [f"{kind}[{trial.info.id}]" for kind in ("bed", "bed damping", "bed unloading", "depth zero")]
         for (values, forms), lane in zip(points, into, strict=True):
-            bed, damper, zero = (values.get(name, 0.0) for name in own)
+            bed, damper, unloading, zero = (values.get(name, 0.0) for name in own)
             lane[_SLOT["stiffness"]] = stiffness = values.get(k, stated_k) * (1.0 + bed)
             lane[_SLOT["damping"]] = values.get(c, stated_c) * (1.0 + bed) * (1.0 + damper)
+            lane[_SLOT["unload_change"]] = unloading
             if trial.smooth is not None:
                 lane[_SLOT["shift_depth"]] = -zero
             for form in forms:
@@ -228,11 +228,11 @@ class PenetrationProblem(Problem):
         directions, shrink, doubtful = self._whitening[trial.info.id]
         rest = (trial.other - model)[trial.has_other] / stds(self.tables, True)[1] / doubtful
         rest = rest - directions @ (shrink * (directions.T @ rest)) if len(shrink) else rest
-        return _bounded(rest)
+        return bounded(rest)
 
     def _missed(self, trial: Prepared, model: Array) -> Array:
         """Measured less modelled over the stated noise, of a drop."""
-        return _bounded(of_drop(trial, trial.depth - model[:, 0], trial.other - model[:, 2], self.tables))
+        return bounded(of_drop(trial, trial.depth - model[:, 0], trial.other - model[:, 2], self.tables))
 
     def readings(self, values: Values, forms: Sequence[Form], trials: Sequence[str], late: float) -> dict[str, Array]:
         """What the model reads `late` seconds after each sample's time, over the stated noise, shape [sample_count]."""
@@ -247,6 +247,10 @@ class PenetrationProblem(Problem):
                     force = np.interp(trial.time[trial.has_other] + late, trial.time, out[0])
                     found[trial.info.id] = force / stds(self.tables, True)[1]
         return found
+
+    def centred(self, values: Values, forms: Sequence[Form]) -> dict[str, float]:
+        """See `Problem`: of beds."""
+        return centred(values, list(self.prepared.values()), forms)
 
     def shake(self, along: Mapping[str, Array]) -> None:
         """See `Problem`; of driven trials from the next `rewhiten` on."""
@@ -493,8 +497,3 @@ class PenetrationProblem(Problem):
             depth=max(float(trial.path.depth.max()) for trial in driven),
             rows=int(np.median([trial.has_other.sum() for trial in driven])),
         )  # fmt: skip
-
-
-def _bounded(rest: Array) -> Array:
-    near = np.clip(rest, -1e5, 1e5)
-    return near if math.isfinite(float(rest.sum())) else np.where(np.isfinite(rest), near, _FAILED)
