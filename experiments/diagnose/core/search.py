@@ -12,7 +12,7 @@ from experiments.diagnose.fit.gate import Verdict
 from experiments.diagnose.fit.problem import Contacts, Finding
 
 from .candidate_fits import FOLLOWED, WORTH, CandidateFits
-from .pairs import next_starts, pair_starts
+from .pairs import FormsStart, next_starts, pair_starts
 from .rivals import CLOSE, LEAD, Predicted, Rival, compare, folds_of, predict
 
 __all__ = ["Choice", "Search"]
@@ -74,6 +74,8 @@ class Search(CandidateFits):
         best, predicted, rivals = self._settle(best, first)
         if len(best.effects) == 2 and not any(rival.same for rival in rivals):
             best, predicted, rivals = self._second(best) or (best, predicted, rivals)
+        if self.pairs and len(best.effects) == 2:  # it competes again in a later search
+            self.pairs = (*self.pairs, FormsStart(best.forms, best.fit.values))
         left = self._gate(best)
         same = tuple(rival.hypothesis for rival in rivals if rival.same)
         return Choice(self.base, best, same, tuple(self.table), left, rivals, predicted)
