@@ -32,7 +32,6 @@ _DRAWS, _REFITS = 600, 400  # synthetic campaigns of a null, and of a thorough o
 _MARGIN = 1.5  # standard deviations beyond the gate that something unknown must reach, as no effect supports it
 _MOST_LEFT = 2.5  # chi-square a sample up to which an effect is near enough to the motion to weight rows by it
 _ON = 1.0  # chi-square by which a fit must improve to be taken instead
-_HARDLY = 1e-3  # share of what was left, below which other kinds of scatter have nothing to explain
 _NO_MOTION = 0.5  # share of what the base model leaves, below which an effect describes the motion
 
 
@@ -251,10 +250,10 @@ class _Course:
         """Where something is left, replicates are compared by what each has of its own."""
         if not self._compares(choice):
             return choice
-        fits, named, little = (choice.best.fit, choice.base.fit), choice.left.passed, _HARDLY * choice.left.score
+        fits, named = (choice.best.fit, choice.base.fit), choice.left.passed
         later = [kinds for kinds in (self.problem.zero_scatter, self.problem.force_scatter) if kinds]
         for kinds, beside in itertools.product(((), *later), fits[1:] if named else fits):
-            if not named and (choice.left.passed or choice.left.score < little):
+            if choice.left.passed and not named:
                 break
             scatter = renoised.scatter_of(beside, self.held_out, apart=True, kinds=kinds)
             if not scatter.parameters or set(scatter.model_std) == set(self.model_std):
@@ -265,7 +264,7 @@ class _Course:
                 continue
             self.tell("replicates are found to differ beside what is left: choosing again", 0.0)
             than = None if kinds == self.problem.force_scatter else choice
-            choice = self._chosen_with(scatter, than=than) or choice
+            choice = self._reweighed(self._chosen_with(scatter, than=than) or choice)
         return choice
 
     def _scattered_alone(self, choice: Choice) -> Choice:
