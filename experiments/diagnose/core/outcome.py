@@ -18,6 +18,7 @@ from experiments.diagnose.noise.colour import Colour
 from experiments.diagnose.noise.jitter import Jitter
 from experiments.diagnose.noise.replicates import groups_of
 from experiments.diagnose.noise.spectrum import Line, lines_of
+from vis.page.numbers import foldable, quote
 from vis.page.sentences import Sentences
 
 from .deciding import Gap, certain, closes, gap_of, smallest, unscattered, values_of_all
@@ -374,7 +375,7 @@ def _inflations(one: Fit, other: Fit) -> tuple[float, float]:
 
 def _with_error(force: float, std: float) -> str:
     """0.112 ± 0.008 N; a force that the model gives exactly has no error."""
-    return f"{force:.3g} ± {std:.2g} N" if std > 0 else f"{force:.3g} N"
+    return foldable(quote(force, std or None, "N"))
 
 
 def _between(one: Fit) -> Array:
