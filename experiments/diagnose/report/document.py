@@ -64,6 +64,8 @@ def document(found: Diagnosis, near: Sequence[Near] | None = None) -> dict[str, 
         diagnosis["gap_with_scatter"] = {
             stage: {"fit": fitted, "held_out": held_out} for stage, (fitted, held_out) in stages.items()
         } | {"freedom": weighed.freedom}
+    if rule := found.allowed_by:
+        diagnosis["allowed_by"] = rule
     if found.verdict == "unknown":
         diagnosis["leading"] = _leading(found)
         diagnosis["left"] = [asdict(p) for p in found.left]
