@@ -16,7 +16,7 @@ from vis.diagnose.figures import (
     trials_of,
     worst,
 )
-from vis.diagnose.usable import has_numbers_to_use, secant_depth
+from vis.diagnose.usable import has_numbers_to_use, stiffness_words
 from vis.page.answer import MOST_ROWS
 from vis.page.numbers import beside, plain, quote, short
 from vis.page.page import Block, Section, Tile, listing, table, table_of, text
@@ -308,10 +308,9 @@ def _to_use(diagnosis: Result) -> list[Block]:
     """The numbers of the best model in one table, where there is a K to use."""
     if not has_numbers_to_use(diagnosis):
         return []
-    depth = secant_depth(diagnosis)
-    secant = "" if depth is None else f", F / z at {1e3 * depth:.3g} mm"
+    meant = f", {words}" if (words := stiffness_words(diagnosis)) else ""
     rows = [
-        (name + (secant if name.startswith("stiffness") else ""), _value(entry),
+        (name + (meant if name.startswith("stiffness") else ""), _value(entry),
          _error(diagnosis, entry, name, "after"), unit_text(entry["unit"]))
         for name, entry in diagnosis["base"]["after"].items()
     ] + [(f"{effect} {name}", *numbers) for effect, name, *numbers in _effects(diagnosis)]  # fmt: skip
@@ -320,8 +319,10 @@ def _to_use(diagnosis: Result) -> list[Block]:
 
 def _numbers(diagnosis: Result) -> list[Block]:
     effects, after = _effects(diagnosis), diagnosis["base"]["after"]
+    meant = f" (after: {words})" if (words := stiffness_words(diagnosis)) else ""
     base = [
-        (name, _value(entry), _error(diagnosis, entry, name, "before"), _value(after[name]),
+        (name + (meant if name.startswith("stiffness") else ""), _value(entry),
+         _error(diagnosis, entry, name, "before"), _value(after[name]),
          _error(diagnosis, after[name], name, "after"), unit_text(entry["unit"]))
         for name, entry in diagnosis["base"]["before"].items() if name in after
     ]  # fmt: skip

@@ -87,6 +87,7 @@ class Form:
     redefines: tuple[str, ...] = ()
     """Base parameters that mean another thing beside this form (a straight spring's slope is not that of a bent one
     at its beginning): what was stated of them is no measure of it."""
+    stiffness: str = ""  # what K is beside this form, where it redefines it
     numbers: tuple[Number, ...] = ()  # of the term (tumbles) or of the law (pushes), as the effect's file declares them
     bends: tuple[Bend, ...] = ()  # what may bend it
     form_std: float = 0.0  # of the amplitude, relative: how far nature's law lets it be another number than the form's

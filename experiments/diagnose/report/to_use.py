@@ -6,7 +6,7 @@ from typing import Any
 
 from experiments.campaign.model_errors import is_biased
 from experiments.diagnose.fit.gaps import numeral
-from vis.diagnose.usable import has_numbers_to_use, secant_depth
+from vis.diagnose.usable import has_numbers_to_use, secant_depth, stiffness_words
 from vis.page.numbers import foldable, quote
 
 from .sentences import say
@@ -33,7 +33,9 @@ def use_sentences(diagnosis: Mapping[str, Any]) -> list[str]:
     each = say("one_k_each") if len(stiffnesses) > 1 else ""
     is_open = [name for name, entry in after.items() if name.startswith("damping") and entry["std"] is None]
     depth = secant_depth(diagnosis)
-    secant, of_depth = ("", "") if depth is None else (say("secant", depth_mm=1e3 * depth), say("of_depth"))
+    meant = stiffness_words(diagnosis)
+    secant = f" ({meant})" if meant else ""
+    of_depth = "" if depth is None else say("of_depth")
     sentence = say("use", numbers=", ".join(shown), secant=secant, beside=beside, each=each, of_depth=of_depth)
     bounds = "".join(_bound(name, after[name]["at_most"]) for name in is_open[:_SHOWN] if "at_most" in after[name])
     covered = diagnosis.get("covered", {})
