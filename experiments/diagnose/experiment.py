@@ -114,8 +114,8 @@ run, resume = computed_run("diagnose", DiagnoseSettings, _compute, check=lambda 
 
 def _quantity(entry: Json, *, at_end: bool) -> Json:
     """A fitted number with its standard error; at the end of its range, or where it is not determined, it has none."""
-    number = {key: value for key, value in entry.items() if key not in ("determined", "at_most")}
-    if at_end:
+    number = {key: value for key, value in entry.items() if key != "determined"}
+    if at_end and "at_most" not in entry:
         return {**number, "std": None, "note": "at the end of its range: no standard error"}
     if entry["std"] is None or not entry.get("determined", True):
         bound = f"; at most {numeral(entry['at_most'], 2)} (95 % bound)" if "at_most" in entry else ""

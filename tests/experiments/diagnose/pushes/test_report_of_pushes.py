@@ -1,6 +1,7 @@
 """Pushes of two plates, one of them with another zero of the depth: what is said of it, of K and C, and what next."""
 
 import json
+import re
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
@@ -21,7 +22,8 @@ from experiments.diagnose.core.rivals import folds_of, predict
 from experiments.diagnose.experiment import diagnose_campaign
 from experiments.diagnose.fit.evidence import Hypothesis
 from experiments.diagnose.fit.fitting import fit, settled
-from experiments.diagnose.push.remarks import Push, contradict, highest_damping
+from experiments.diagnose.push.problem import make_problem
+from experiments.diagnose.push.remarks import Push, at_one_speed, contradict, highest_damping
 from experiments.diagnose.report.document import COUNTS, _write_model, _write_near_models, document, peak_ratios
 from experiments.diagnose.report.gaps import Gaps
 from experiments.diagnose.report.sentences import behind_words
@@ -174,10 +176,14 @@ def test_there_is_one_k_to_use_for_each_plate_before_all_else(result):
 
 
 def test_a_c_that_these_pushes_leave_open_has_no_error_and_an_experiment(result):
-    found, said, _ = result
+    found, said, folder = result
     for stage in ("before", "after"):
         assert said["base"][stage]["damping@0.06"]["std"] is None
         assert found["quantities"][f"damping@0.08_{stage}"]["std"] is None
+    most = found["quantities"]["damping@0.06_after"]["at_most"]
+    assert most == said["base"]["after"]["damping@0.06"]["at_most"]
+    cells = f"<td>below {most:.2g}</td><td>not determined</td>"
+    assert cells in re.sub(r"<td[^>]*>", "<td>", (folder / "report.html").read_text(encoding="utf-8"))
     assert "To determine C" in said["next_experiment"]
     assert "spike" not in said["next_experiment"]
 
@@ -196,6 +202,21 @@ def test_pushes_contradict_one_another_on_c_by_the_best_models_spring():
 
     assert not contradicting(3.0, 2.0, 0.0)
     assert contradicting(3.0, 2.0, -2.0)
+
+
+def test_pushes_of_one_speed_leave_c_open_whatever_its_error():
+    """C v is a constant force there; a hold, or another speed, tells it from one."""
+    time = np.linspace(0.0, 2.0, 200)
+    for speeds, is_open in (((0.005, 0.005), True), ((0.005, 0.0075), False)):
+        trials = []
+        for k, speed in enumerate(speeds):
+            columns = {"t_s": time, "depth_m": speed * time, "force_N": 900.0 * speed * time + 20.0 * speed}
+            trials.append((f"{k}", "driven", speed, Recording(columns)))
+        problem = make_problem(campaign_of(trials, doubt=(1.0, 1.0), depth_std=1e-5))
+        values, errors = {"stiffness": 900.0, "damping": 20.0}, {"stiffness": 1.0, "damping": 1.0}
+        assert problem.undetermined(values, (), ("0", "1"), errors) == (("damping",) if is_open else ())
+    held = Push(0.012, 0.005 * time, np.where(time < 1.5, 0.005, 0.0), time, time)
+    assert not at_one_speed([held]) and at_one_speed([replace(held, speed=np.full(200, 0.005))])
 
 
 def test_a_c_that_several_speeds_determine_keeps_its_error_though_no_push_shows_it_alone(tmp_path):
