@@ -413,7 +413,7 @@ class PenetrationProblem(Problem):
 
     def write_model(
         self, path: str, values: Values, forms: Sequence[Form], base: Values | None = None,
-        errors: Mapping[str, object] | None = None, scatter: Mapping[str, float] | None = None,
+        notes: Mapping[str, Mapping[str, object]] | None = None,
     ) -> None:  # fmt: skip
         """See `Problem`. Of several diameters the middle one stands in [surface] and [spike], all in [notes]. A trial
         without a diameter gets that of the campaign's [spike]."""
@@ -425,7 +425,7 @@ class PenetrationProblem(Problem):
             for form in forms
         )  # fmt: skip
         pairs = (self._pairs(values), self._pairs(base) if forms and base is not None else {})
-        model = model_of(self.tables, self._middle, *pairs, effects, self.covered, errors, scatter)
+        model = model_of(self.tables, self._middle, *pairs, effects, self.covered, notes or {})
         write_model(Path(path), model)
 
     def _pairs(self, values: Values) -> Pairs:

@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from experiments.campaign.model_errors import is_biased
+from experiments.campaign.model_errors import bias_words
 from experiments.diagnose.fit.gaps import numeral
 from vis.diagnose.usable import has_numbers_to_use, secant_depth, stiffness_words
 from vis.page.numbers import foldable, quote
@@ -92,13 +92,8 @@ def law_sentences(diagnosis: Mapping[str, Any]) -> list[str]:
 
 def peak_sentences(diagnosis: Mapping[str, Any]) -> list[str]:
     """That the model is too low or too high where pushes are deepest, by more than chance; none where it is not."""
-    peaks = diagnosis.get("peaks")
-    if not peaks or not is_biased(peaks):
-        return []
-    ends = [f"{100 * (peaks[key] - 1):+.2g}" for key in ("lowest", "highest")]
-    side = "low" if peaks["mean"] > 1 else "high"
-    mean = f"{100 * (peaks['mean'] - 1):+.2g}"
-    return [say("peaks_off", trials=peaks["trials"], low=ends[0], high=ends[1], mean=mean, side=side)]
+    words = bias_words(diagnosis.get("peaks"))
+    return [] if words is None else [say("peaks_off", **words)]
 
 
 def unloading_sentences(diagnosis: Mapping[str, Any]) -> list[str]:

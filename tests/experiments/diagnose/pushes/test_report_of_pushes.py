@@ -5,7 +5,6 @@ import re
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -32,6 +31,7 @@ from experiments.diagnose.report.to_use import peak_sentences, use_sentences
 from experiments.diagnose.settings import DiagnoseSettings
 from rigid.series import read_series
 
+SHARES = (1.04, 1.06, 1.08, 1.10)
 OFF = 0.4e-3
 """By which the depth of trial n2 is too large [m]."""
 STIFFNESS = {0.06: 5500.0, 0.08: 9000.0}
@@ -289,26 +289,15 @@ def test_a_model_below_every_measured_peak_is_told_with_by_how_much():
     """Four pushes, measured 4, 6, 8 and 10 % above the model at the deepest point; one without a depth is left out."""
     depth = np.array([0.0, 0.5, 1.0, 1.0, 1.0, 1.0, 1.0, 0.5]) * 0.01
 
-    def compare(values, forms, trial):
-        if trial == "blind":
-            return {"force": {"measured": depth, "model": depth}}
-        return {"force": {"depth_m": depth, "model": 1e3 * depth, "measured": (1 + 0.01 * float(trial)) * 1e3 * depth}}
-
-    found = SimpleNamespace(
-        fitted=("4", "6", "blind"),
-        held_out=("8", "10"),
-        best_values={},
-        forms=(),
-        problem=SimpleNamespace(compare=compare),
-    )
-    peaks = peak_ratios(found)
+    model, blind = 1e3 * depth, {"force": {"measured": depth, "model": depth}}
+    pushes = [{"force": {"depth_m": depth, "model": model, "measured": share * model}} for share in SHARES]
+    peaks = peak_ratios([*pushes, blind])
     assert (peaks["trials"], peaks["lowest"], peaks["highest"]) == (4, pytest.approx(1.04), pytest.approx(1.10))
     assert peaks["mean"] == pytest.approx(1.07) and peaks["std"] == pytest.approx(0.0258, rel=1e-2)
     (said,) = peak_sentences({"peaks": peaks})
     assert "too low" in said and "+4 to +10" in said and "+7 %" in said
     assert not peak_sentences({"peaks": peaks | {"std": 0.05}}) and not peak_sentences({})  # chance: 3.18 std / 2
-    found.held_out = ()
-    assert peak_ratios(found) is None
+    assert peak_ratios([*pushes[:2], blind]) is None
 
 
 def test_of_a_second_name_the_nearest_in_its_place_is_compared_by_prediction_too(diagnosed):
