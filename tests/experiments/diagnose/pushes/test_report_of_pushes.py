@@ -127,7 +127,7 @@ def test_what_was_set_aside_is_in_no_gap_and_in_a_table_of_its_own(result):
     for rows in (said["by_phase"], said["by_condition"]):
         assert max(row["after"] for row in rows) < 1.3
     assert "n2" not in {trial for row in said["by_condition"] for trial in row["trials"]}
-    assert said["residue"] == []
+    assert said["residue"] == [] and said["allowed_by"] == "small_gap"
 
 
 def test_the_force_of_an_effect_is_that_of_the_law_where_it_is_largest(result):
