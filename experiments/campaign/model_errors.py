@@ -26,7 +26,7 @@ SHARE = 0.5
 _MATTERS = 0.01  # of a peak force: a bias below it is not reported
 
 
-def bias_words(peaks: Any) -> dict[str, Any] | None:
+def bias_words(peaks: Any) -> dict[str, str] | None:
     """By how much a model is off at the deepest point of its pushes, as sentences have it: `side` (the model is too low
     or too high), `mean`, `low` and `high` in per cent, `trials`.
 
@@ -41,7 +41,7 @@ def bias_words(peaks: Any) -> dict[str, Any] | None:
         return None
     mean, low, high = (f"{100 * (peaks[key] - 1):+.2g}" for key in keys[:3])
     side = "low" if peaks["mean"] > 1 else "high"
-    return {"side": side, "mean": mean, "low": low, "high": high, "trials": peaks["trials"]}
+    return {"side": side, "mean": mean, "low": low, "high": high, "trials": str(peaks["trials"])}
 
 
 @dataclass(frozen=True)
