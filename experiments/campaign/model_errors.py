@@ -7,6 +7,7 @@ are the random errors of the fit, right if its model is.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,7 @@ from rigid.intervals import half_width
 
 from .tables import ERRORS_NOTE, PenetrationModel, TumbleModel
 
-__all__ = ["ModelErrors", "errors_of", "is_biased"]
+__all__ = ["ModelErrors", "bias_words", "errors_of"]
 
 Array = NDArray[np.float64]
 SHARE = 0.5
@@ -25,13 +26,22 @@ SHARE = 0.5
 _MATTERS = 0.01  # of a peak force: a bias below it is not reported
 
 
-def is_biased(peaks: Mapping[str, float]) -> bool:
-    """Whether a model is too low or too high at the deepest point of its pushes, by 1 % or more and beyond chance.
+def bias_words(peaks: Any) -> dict[str, str] | None:
+    """By how much a model is off at the deepest point of its pushes, as sentences have it: `side` (the model is too low
+    or too high), `mean`, `low` and `high` in per cent, `trials`.
 
-    ``peaks``: a note `PEAKS_NOTE`. Chance: Student's 95 % interval of the mean over the pushes.
+    ``peaks``: a note `PEAKS_NOTE`. None for anything else, and for a bias below 1 % or within chance: Student's 95 %
+    interval of the mean over the pushes.
     """
-    off = abs(float(peaks["mean"]) - 1.0)
-    return off > max(_MATTERS, half_width(float(peaks["std"]), int(peaks["trials"])) or 0.0)
+    keys = ("mean", "lowest", "highest", "std", "trials")
+    if not isinstance(peaks, Mapping) or any(not isinstance(peaks.get(key), int | float) for key in keys):
+        return None
+    chance = half_width(float(peaks["std"]), int(peaks["trials"])) or 0.0
+    if abs(float(peaks["mean"]) - 1.0) <= max(_MATTERS, chance):
+        return None
+    mean, low, high = (f"{100 * (peaks[key] - 1):+.2g}" for key in keys[:3])
+    side = "low" if peaks["mean"] > 1 else "high"
+    return {"side": side, "mean": mean, "low": low, "high": high, "trials": str(peaks["trials"])}
 
 
 @dataclass(frozen=True)

@@ -233,7 +233,8 @@ def _show_all(result: Mapping[str, Any], console: Console) -> None:
         value, std = quantity.get("value"), quantity.get("std")
         cells = [_number(std, None) if std != 0 else "exact"] if spreads else []
         cells += [_interval(quantity.get("interval"))] if intervals else []
-        table.add_row(name, _number(value, std), *cells, _unit(quantity.get("unit", ""), value, std))
+        shown = f"below {quantity['at_most']:.2g}" if "at_most" in quantity else _number(value, std)
+        table.add_row(name, shown, *cells, _unit(quantity.get("unit", ""), value, std))
     if quantities:
         console.print(table, markup=False)
     _show_tables(result.get("tables", []), console)

@@ -24,9 +24,9 @@ from experiments.runs.result import Result, quantities_of
 from experiments.runs.types import Json
 from experiments.runs.whole_runs import computed_run
 from experiments.spatial.settings import ON_ANY_GROUND
-from rigid.intervals import NORMAL, half_width
+from rigid.intervals import half_width
 from rigid.planar.trajectory import LAUNCH_DISTANCE
-from vis.penetrate.errors import in_95
+from vis.penetrate.errors import half_of, in_95
 
 from . import robots as compare_robots
 from . import spatial as compare_spatial
@@ -212,8 +212,8 @@ def _halves(result: Json) -> dict[str, float | None]:
     if result.get("experiment") == "penetrate":
         return {name: entry.get("std") for name, entry in in_95(result).items()}
     beds = len(result.get("beds", ()))
-    stds = {name: entry.get("std") for name, entry in result.get("quantities", {}).items()}
-    return {name: half_width(std, beds) if beds else NORMAL * std for name, std in stds.items() if std is not None}
+    known = {name: entry for name, entry in result.get("quantities", {}).items() if entry.get("std") is not None}
+    return {name: half_width(entry["std"], beds) if beds else half_of(entry) for name, entry in known.items()}
 
 
 def _differs(first: RunFolder, second: RunFolder, results: list[Json]) -> list[Json]:

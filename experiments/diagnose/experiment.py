@@ -17,7 +17,7 @@ from experiments.runs.progress import Progress
 from experiments.runs.result import Result
 from experiments.runs.types import Json
 from experiments.runs.whole_runs import computed_run
-from vis.diagnose.usable import has_numbers_to_use, secant_depth
+from vis.diagnose.usable import has_numbers_to_use, stiffness_words
 
 from .core.diagnosis import diagnose
 from .core.outcome import Diagnosis
@@ -114,8 +114,8 @@ run, resume = computed_run("diagnose", DiagnoseSettings, _compute, check=lambda 
 
 def _quantity(entry: Json, *, at_end: bool) -> Json:
     """A fitted number with its standard error; at the end of its range, or where it is not determined, it has none."""
-    number = {key: value for key, value in entry.items() if key not in ("determined", "at_most")}
-    if at_end:
+    number = {key: value for key, value in entry.items() if key != "determined"}
+    if at_end and "at_most" not in entry:
         return {**number, "std": None, "note": "at the end of its range: no standard error"}
     if entry["std"] is None or not entry.get("determined", True):
         bound = f"; at most {numeral(entry['at_most'], 2)} (95 % bound)" if "at_most" in entry else ""
@@ -150,10 +150,10 @@ def _result(found: Diagnosis, diagnosis: Json, made_up: str | None) -> Result:
         f"{effect['id']}.{name}": _quantity(entry, at_end=f"{effect['id']}.{name}" in at_end["after"])
         for effect in diagnosis["effects"] for name, entry in effect["parameters"].items()
     }  # fmt: skip
-    if (depth := secant_depth(diagnosis)) is not None:
+    if meant := stiffness_words(diagnosis):
         for name, number in base["after"].items():
             if name.startswith("stiffness"):
-                number["note"] = f"F / z at the depth D = {1e3 * depth:.3g} mm; {number['note']}"
+                number["note"] = f"{meant}; {number['note']}"
     if has_numbers_to_use(diagnosis):  # these first
         quantities = base["after"] | effects | quantities | base["before"]
     else:

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from coupling import Penetration, Run
 from experiments.campaign import PenetrationModel, read_model
 from experiments.campaign.files import MODEL_COPY
-from experiments.campaign.model_errors import ModelErrors, errors_of, is_biased
+from experiments.campaign.model_errors import ModelErrors, bias_words, errors_of
 from experiments.campaign.tables import BASE_NOTE, PEAKS_NOTE, RANGE_NOTE, SCATTER_NOTE, EffectTable
 from experiments.diagnose.fit.forms import OwnEffect, load_own
 from experiments.diagnose.push.forms import push_forms
@@ -228,15 +228,8 @@ class AmendedLaw:
 
     def _off_at_peaks(self) -> list[str]:
         """That the model was too low or too high at the deepest point of the pushes that it was fitted to."""
-        peaks = self.model.notes.get(PEAKS_NOTE)
-        keys = ("mean", "lowest", "highest", "std", "trials")
-        if not isinstance(peaks, Mapping) or any(not isinstance(peaks.get(key), int | float) for key in keys):
-            return []
-        if not is_biased(peaks):
-            return []
-        mean, low, high = (100 * (peaks[key] - 1) for key in keys[:3])
-        told = {"side": "low" if mean > 0 else "high", "mean": mean, "low": low, "high": high}
-        return [say("peaks_off", trials=peaks["trials"], **told)]
+        words = bias_words(self.model.notes.get(PEAKS_NOTE))
+        return [] if words is None else [say("peaks_off", **words)]
 
     @property
     def fitted_to(self) -> str:

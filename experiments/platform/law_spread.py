@@ -144,18 +144,24 @@ def spread_of_surface(
 
 
 def spread_entries(
-    quantities: Mapping[str, Json], names: Mapping[str, str], *, surface: str, law: str, parameters: Sequence[str]
+    quantities: Mapping[str, Json],
+    names: Mapping[str, str],
+    *,
+    surface: str,
+    law: str,
+    parameters: Sequence[str],
+    absent: Sequence[str] = (),
 ) -> tuple[Json, str]:
     """``law_spread`` of result.json, and a sentence with the halves of 95 % intervals that a law's parameters give.
 
     `names`: number -> what it is called. `law`: "" for K and C of a row, "file" for that of a ground file, or a name.
-    `parameters`: which of it were moved.
+    `parameters`: which of it were moved. `absent`: numbers that some moved law does not have (`Seen.absent`).
     """
     of = say("of_file") if law == "file" else say("of_law", law=law)
     if not law:
         symbols = [_SYMBOLS[name] for name in parameters or _SYMBOLS]
         of = say("of_surface", names=" and ".join(symbols), surface=surface)
-    entries: Json = {"parameters": list(parameters)}
+    entries: Json = {"parameters": list(parameters), "absent": list(absent)}
     if not parameters:
         return entries, say("no_spread", of=of)
     told = [

@@ -84,23 +84,30 @@ def forms_of(
     if len(answers) == 1:
         return NO_FORMS
     ends = [{name: one[end] for name, one in sure.items()} for end in ("low", "high")]
-    forms = _ranges(answers, best, ends, on_grains=False)
+    forms = _ranges(answers, best, ends, on_grains=False, duration=plan.settings.duration)
     words = [foldable(say("forms_lost", laws=", ".join(lost)))] if lost else []
     return replace(forms, words=(*forms.words, *words))
 
 
 def with_grains(laws: Forms, best: Answer) -> Forms:
     """The ranges over `laws`, widened to a run on grains with the answer `best`; nothing where there are no laws."""
-    return _ranges(laws.numbers["laws"], best, [best], on_grains=True) if laws.numbers else NO_FORMS
+    if not laws.numbers:
+        return NO_FORMS
+    return _ranges(laws.numbers["laws"], best, [best], on_grains=True, duration=laws.numbers.get("duration"))
 
 
-def _ranges(answers: Mapping[str, Answer], best: Answer, more: Sequence[Answer], *, on_grains: bool) -> Forms:
-    """The ranges over `answers` and `more`, around the answer `best` of the run."""
+def _ranges(
+    answers: Mapping[str, Answer], best: Answer, more: Sequence[Answer], *, on_grains: bool, duration: float | None
+) -> Forms:
+    """The ranges over `answers` and `more`, around the answer `best` of the run.
+
+    ``duration``: of each run [s]; None where an older hedgebed has made it.
+    """
     ranges = {}
     for name in ANSWER:
         values = [answer[name] for answer in (*answers.values(), *more) if name in answer]
         ranges[name] = entry(name, best[name], min(values), max(values))
-    numbers: Json = {"laws": answers, "ranges": ranges}
+    numbers: Json = {"laws": answers, "ranges": ranges, "duration": duration}
     words = expected_words(numbers, best, on_grains=on_grains)
     return Forms(numbers=numbers, words=tuple(map(foldable, words)))
 
@@ -125,6 +132,8 @@ def expected_words(numbers: Json, best: Answer, *, on_grains: bool) -> list[str]
     if near is not None:
         key = "expected_of_grains" if on_grains else "expected_of_laws"
         said.insert(0, say(key, what=words["what"], law=near, low=shown(answers[near]), high=shown(best)))
+    if numbers.get("duration") and any(answer["longest_flight"] > 0 for answer in (best, *answers.values())):
+        said.append(say("forms_until", duration=numbers["duration"]))
     return said
 
 

@@ -36,35 +36,32 @@ def add_spread(
     plan: SpatialPlan,
     result: Json,
     run_on: Callable[[SpatialPlan], SpatialRun],
-    *,
-    answer_of: Callable[[SpatialRun], Answer] | None = None,
 ) -> None:
     """Add the standard deviations that follow from those of K and C, and a sentence on them.
 
-    `run_on` makes the run of another plan, ready to be stepped; `answer_of` reads one that has been.
+    `run_on` makes the run of another plan, ready to be stepped.
     """
     uncertain, best = uncertain_in(plan), result["quantities"]
     depends = {name: entry["value"] for name, entry in best.items() if name not in _OF_NO_LAW}
-    read = answer_of or _answer
 
     def moved(name: str, value: float) -> Answer:
         run = run_on(_moved(plan, name, value))
         run.run()
-        return read(run)
+        return {name: entry["value"] for name, entry in quantities_of(run).items()}
 
     seen = Seen(moved)
     if uncertain:
         result["quantities"] = with_spread(best, spread_of_surface(uncertain, seen, depends))
     parameters = [one.name for one in uncertain]
     result["law_spread"], sentence = spread_entries(
-        result["quantities"], _SPREAD_OF, surface=plan.surface, law="", parameters=parameters
+        result["quantities"],
+        _SPREAD_OF,
+        surface=plan.surface,
+        law="",
+        parameters=parameters,
+        absent=seen.absent(depends),
     )
-    result["law_spread"]["absent"] = seen.absent(depends)
     result["departures"]["sentences"].append(sentence)
-
-
-def _answer(run: SpatialRun) -> Answer:
-    return {name: entry["value"] for name, entry in quantities_of(run).items()}
 
 
 def _moved(plan: SpatialPlan, name: str, value: float) -> SpatialPlan:

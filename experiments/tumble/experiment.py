@@ -140,9 +140,8 @@ def _add_spread(
     if fitted is not None or parameters:
         result["quantities"] = with_spread(best, stds)
     result["law_spread"], sentence = spread_entries(
-        result["quantities"], _SPREAD_OF, surface=surface, law=law, parameters=parameters
+        result["quantities"], _SPREAD_OF, surface=surface, law=law, parameters=parameters, absent=seen.absent(depends)
     )
-    result["law_spread"]["absent"] = seen.absent(depends)
     result["departures"]["sentences"].append(sentence)
 
 

@@ -54,6 +54,7 @@ class Form:
     needs: str = ""  # Of pushes: ``retreats``, ``speeds`` or ``drops``, what trials must show for it to be a candidate
     form_std: float = 0.0  # How far nature's amplitude may differ from the form's, relative
     redefines: tuple[str, ...] = ()  # Base parameters that mean another thing beside this form
+    stiffness: str = ""  # Of pushes: what K is beside this form, where it redefines it
     becomes: tuple[tuple[str, Callable[..., bool]], ...] = ()
     """Of pushes: another effect, and whether the form is that one at these numbers (slots in SI units, by name)."""
 

@@ -74,7 +74,7 @@ def test_the_error_of_a_law_in_other_beds_is_a_share_in_per_cent(tmp_path):
     folder = tmp_path / "run"
     shutil.copytree(kept, folder)
     page = write_report(folder).read_text(encoding="utf-8")
-    assert "<td>10.7 %</td>" in page.replace("\N{NO-BREAK SPACE}", " ")
+    assert "<td>10.75 %</td>" in page.replace("\N{NO-BREAK SPACE}", " ")
 
 
 RANGE = {"low": 0.011, "high": 0.02, "unit": "m"}
@@ -98,7 +98,7 @@ def robot_result(**more):
         ({"ground": "bed", "grains": {}}, ("14 mm", "one bed", "not known", "not known")),
         (
             {"ground": "bed", "beds": [], "sure": {"sinkage_largest": {"value": 0.0142, "high": 0.0165, "unit": "m"}}},
-            ("14 mm", "2 mm", "not known", "not known"),
+            ("14.2 mm", "2.3 mm", "not known", "not known"),
         ),
         ({"ground": "rft"}, ("14 mm", "not known")),
         ({"ground": "rft", "forms": {"ranges": {"sinkage_largest": RANGE}}}, ("14 mm", "11 to 20 mm")),
@@ -256,7 +256,7 @@ def test_a_fitted_number_has_its_standard_error_or_why_it_has_none():
     assert "standard error" in shown.head[2]
     assert rows["Crater share (plastic-sinkage)"] == ("0.955", "0.019")
     assert rows["Crater bend (plastic-sinkage)"] == ("2.50", "end of range")
-    assert rows["Stiffness"] == ("39 N/m", "2 N/m")
+    assert rows["Stiffness"] == ("39.3 N/m", "2.2 N/m")
 
 
 def test_a_comparison_has_both_numbers_their_spreads_and_the_difference():

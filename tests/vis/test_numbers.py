@@ -17,7 +17,13 @@ SPACE = "\N{NO-BREAK SPACE}"
         ((92.31, 4.2, "N/m"), "92 ± 4 N/m"),
         ((92.31, 1.4, "N/m"), "92.3 ± 1.4 N/m"),
         ((0.00215, 0.00012, "m"), "2.15 ± 0.12 mm"),
-        ((0.231, 0.02, "%"), "23 ± 2 %"),
+        ((0.231, 0.02, "%"), "23.1 ± 2.0 %"),
+        ((38.43, 2.39, "N"), "38.4 ± 2.4 N"),
+        ((38.43, 3.54, "N"), "38.4 ± 3.5 N"),
+        ((38.43, 3.56, "N"), "38 ± 4 N"),
+        ((38.43, 9.7, "N"), "38 ± 10 N"),
+        ((0.3843, 0.097, "N"), "0.38 ± 0.10 N"),
+        ((6130.0, 239.0, "N/m"), "6130 ± 240 N/m"),
         ((123456.7, 1200.0, "N/m"), "123 500 ± 1200 N/m"),
         ((20480, 0, "1"), "20 480"),
         ((9.80665, 0.0, "m/s2"), "9.807 m/s²"),
@@ -37,12 +43,12 @@ def test_quote(given, words):
 
 def test_a_number_smaller_than_its_error_is_not_shown_as_zero():
     assert beside(0.3749, 2.387) == "0.4" and beside(-0.3749, 2.387) == "-0.4"
-    assert beside(299.3846, 0.3395) == "299.4" and beside(4.068, 0.026) == "4.07"
+    assert beside(299.3846, 0.3695) == "299.4" and beside(4.068, 0.026) == "4.068"
     assert beside(0.3749, None) == "0.3749" and beside(0.0, 2.4) == "0.0"
 
 
 def test_quantity_takes_what_result_json_holds():
-    assert quantity({"value": 4.21, "std": 0.35, "unit": "N s/m"}).replace(SPACE, " ") == "4.2 ± 0.3 N s/m"
+    assert quantity({"value": 4.21, "std": 0.35, "unit": "N s/m"}).replace(SPACE, " ") == "4.21 ± 0.35 N s/m"
     assert quantity({"value": 0.284, "std": None, "unit": "1"}, unit="%").replace(SPACE, " ") == "28 %"
     assert quantity({"value": 0.000546, "std": None, "unit": "m"}).replace(SPACE, " ") == "0.55 mm"
     assert quantity({"value": 549.0, "std": None, "unit": "N/m"}).replace(SPACE, " ") == "550 N/m"

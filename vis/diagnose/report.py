@@ -16,9 +16,9 @@ from vis.diagnose.figures import (
     trials_of,
     worst,
 )
-from vis.diagnose.usable import has_numbers_to_use, secant_depth
+from vis.diagnose.usable import has_numbers_to_use, stiffness_words
 from vis.page.answer import MOST_ROWS
-from vis.page.numbers import beside, plain, quote, short
+from vis.page.numbers import beside, plain, quote, short, within
 from vis.page.page import Block, Section, Tile, listing, table, table_of, text
 from vis.page.report import Report, Result, again, capital, report_of, unit_text
 from vis.page.sentences import Sentences
@@ -82,7 +82,10 @@ def _tile_of(name: str, entry: Result) -> Tile:
     if entry["std"]:
         return Tile(label, quote(entry["value"], entry["std"], unit), note)
     why = say("at_the_end" if "end of its range" in note else "not_determined")
-    return Tile(label, quote(entry["value"], None, unit), note, (why, "", ""))
+    value = quote(entry["value"], None, unit)
+    if "at_most" in entry:
+        value = within(0.0, entry["at_most"], unit)
+    return Tile(label, value, note, (why, "", ""))
 
 
 def _drawn(report: Report, diagnosis: Result) -> dict[str, list[Block]]:
@@ -282,17 +285,21 @@ def _sizes(diagnosis: Result) -> list[Block]:
 
 
 def _value(entry: Result) -> str:
-    """A number beside its standard error, with the digits that the terminal shows."""
+    """A number beside its standard error, with the digits that the terminal shows; of C that is not determined its
+    upper bound."""
+    if "at_most" in entry:
+        return say("below", bound=short(entry["at_most"], 2))
     return beside(entry["value"], entry["std"]).replace("-", "\N{MINUS SIGN}")
 
 
 def _error(diagnosis: Result, entry: Result, name: str, stage: str) -> str:
     """The standard error of a number, or why it has none."""
+    if "at_most" in entry:
+        return say("not_determined")
     if any(bound["parameter"] == name and bound["at_bound"] for bound in diagnosis.get("at_bounds", {}).get(stage, [])):
         return "at its end"
     lost = entry["std"] is None or not entry.get("determined", True)
-    bound = f", at most {short(entry['at_most'], 2)}" if "at_most" in entry else ""
-    return f"not determined{bound}" if lost else short(entry["std"], 2)
+    return say("not_determined") if lost else short(entry["std"], 2)
 
 
 def _effects(diagnosis: Result) -> list[tuple[str, str, str, str, str]]:
@@ -308,10 +315,9 @@ def _to_use(diagnosis: Result) -> list[Block]:
     """The numbers of the best model in one table, where there is a K to use."""
     if not has_numbers_to_use(diagnosis):
         return []
-    depth = secant_depth(diagnosis)
-    secant = "" if depth is None else f", F / z at {1e3 * depth:.3g} mm"
+    meant = f", {words}" if (words := stiffness_words(diagnosis)) else ""
     rows = [
-        (name + (secant if name.startswith("stiffness") else ""), _value(entry),
+        (name + (meant if name.startswith("stiffness") else ""), _value(entry),
          _error(diagnosis, entry, name, "after"), unit_text(entry["unit"]))
         for name, entry in diagnosis["base"]["after"].items()
     ] + [(f"{effect} {name}", *numbers) for effect, name, *numbers in _effects(diagnosis)]  # fmt: skip
@@ -320,8 +326,11 @@ def _to_use(diagnosis: Result) -> list[Block]:
 
 def _numbers(diagnosis: Result) -> list[Block]:
     effects, after = _effects(diagnosis), diagnosis["base"]["after"]
+    meant = f" (after: {words})" if (words := stiffness_words(diagnosis)) else ""
     base = [
-        (name, _value(entry), _error(diagnosis, entry, name, "before"), _value(after[name]),
+        (name + (meant if name.startswith("stiffness") else ""),
+         _DASH if name.startswith("damping") and entry["std"] is None else _value(entry),
+         _error(diagnosis, entry, name, "before"), _value(after[name]),
          _error(diagnosis, after[name], name, "after"), unit_text(entry["unit"]))
         for name, entry in diagnosis["base"]["before"].items() if name in after
     ]  # fmt: skip

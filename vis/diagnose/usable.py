@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-__all__ = ["has_numbers_to_use", "secant_depth"]
+__all__ = ["has_numbers_to_use", "secant_depth", "stiffness_words"]
 
 _OF_POWER = "K * z * (z / D)^"  # how an equation begins in which K is F / z at z = D alone
 
@@ -21,3 +21,11 @@ def secant_depth(diagnosis: Mapping[str, Any]) -> float | None:
     powers = any(row["equation"].startswith(_OF_POWER) for row in diagnosis.get("equations", []))
     depth: float | None = diagnosis.get("typical_depth_m")
     return depth if powers else None
+
+
+def stiffness_words(diagnosis: Mapping[str, Any]) -> str:
+    """What K is beside the forms of the best model, such as "slope at the surface"; empty beside a straight spring."""
+    depth = secant_depth(diagnosis)
+    secant = [] if depth is None else [f"F / z at the depth D = {1e3 * depth:.3g} mm"]
+    rows = [row for row in diagnosis.get("equations", []) if not row["equation"].startswith(_OF_POWER)]
+    return ", ".join([*secant, *(row["stiffness"] for row in rows if "stiffness" in row)])

@@ -19,8 +19,8 @@ from .search import Choice
 
 __all__ = [
     "Gap", "bends_to_anything", "certain", "closes", "diverging_beside", "explains_nothing", "gap_of",
-    "held_out_divergences", "missed", "one_number", "smallest", "unscattered", "values_of_all", "verdict_of",
-    "well_known",
+    "held_out_divergences", "is_misfit_of_form", "missed", "one_number", "smallest", "unscattered", "values_of_all",
+    "verdict_of", "well_known",
 ]  # fmt: skip
 
 _AS_LIKELY = 1.0  # nats within which a third effect is named as well
@@ -100,7 +100,7 @@ def verdict_of(
         return "unknown"
     little = after.fit <= SMALL and (after.held_out or 0.0) <= SMALL
     little = little and (predicts or _share_left(choice, held_out) < _NO_EFFECT)
-    passed = (fits and predicts) or little or _of_form(choice, held_out)
+    passed = (fits and predicts) or little or is_misfit_of_form(choice, held_out)
     if not passed and (fits or after.fit <= SMALL):  # or what is held out follows for a while only
         values = held_out_fit(found.model, held_out, found.values)
         ask = partial(diverging_held_out, found, held_out, values, seed=seed, enough=SMALL)
@@ -126,7 +126,7 @@ def explains_nothing(choice: Choice, held_out: tuple[str, ...]) -> bool:
     return after.fit >= before.fit and (after.held_out or 0.0) >= (before.held_out or 0.0)
 
 
-def _of_form(choice: Choice, held_out: tuple[str, ...]) -> bool:
+def is_misfit_of_form(choice: Choice, held_out: tuple[str, ...]) -> bool:
     """Whether so little is left that it is the form's misfit: nature's form is never quite the library's."""
     found, base = choice.best.fit, choice.base.fit
     left, share = [found.chi_square / found.count], [excess(found) / max(excess(base), 1e-9)]

@@ -112,14 +112,17 @@ def equation(kind: str, form: Form) -> str:
 
 
 def equations_of(kind: str, forms: Sequence[Form], units: Callable[[Form], Mapping[str, str]]) -> list[dict[str, Any]]:
-    """``equations`` of diagnosis.json: effect, form, equation and its parameters' units, a row for each ``[[effect]]``
-    of model.toml: of penetration one a form, of tumbles one an effect. `units`: of a form, name -> unit."""
+    """``equations`` of diagnosis.json: effect, form, equation, its parameters' units and what K is beside it, where
+    that is another than of a straight spring. A row for each ``[[effect]]`` of model.toml: of penetration one a form,
+    of tumbles one an effect. `units`: of a form, name -> unit."""
     rows: dict[str, dict[str, Any]] = {}
     for form in forms:
         key = form.id if kind == "penetration" else form.effect
         row = rows.setdefault(key, {"effect": form.effect, "form": form.name, "equation": equation(kind, form),
                                     "units": {}})  # fmt: skip
         row["units"] |= dict(units(form))
+        if form.stiffness:
+            row["stiffness"] = form.stiffness
     return list(rows.values())
 
 
@@ -134,6 +137,7 @@ def with_comments(model: str, rows: Sequence[Mapping[str, Any]], kind: str) -> s
     for table, row in zip(tables, rows, strict=True):
         said = f"{row['effect']} ({row['form']}): {row['equation'] or 'its equation is in its file'}"
         units = ", ".join(f"{name} [{unit}]" for name, unit in row["units"].items())
+        units += f"; K [N/m]: {row['stiffness']}" if "stiffness" in row else ""
         text += textwrap.fill(f"{said}; {units}", _WIDE, initial_indent="# ", subsequent_indent="#   ") + "\n"
         text += _TABLE + table
     return text

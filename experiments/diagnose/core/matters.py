@@ -20,7 +20,9 @@ from .rivals import LEAD, compare
 from .scatter_gap import gap_with_scatter
 from .search import Choice
 
-__all__ = ["MOST", "explains", "fewest", "is_as_stated", "is_small", "left_by", "takes_below", "undecided"]
+__all__ = [
+    "MOST", "explains", "fewest", "is_as_stated", "is_small", "left_by", "little_left", "takes_below", "undecided",
+]  # fmt: skip
 
 MOST = SMALL  # the gap up to which what is left is too small to matter
 _CLOSED = 0.99
@@ -77,13 +79,18 @@ def explains(choice: Choice, held_out: tuple[str, ...], scatter: Scatter) -> boo
     if not choice.best.effects or undecided(choice):
         return False
     after, weighed = _gaps(choice.best.fit, held_out, scatter)
-    small = after if weighed is None else weighed
+    return little_left(gap_of(choice.base.fit, held_out), after, after if weighed is None else weighed) != ""
+
+
+def little_left(before: Gap, after: Gap, small: Gap) -> str:
+    """The rule of size that lets a name pass: `small_gap`, or `closed` where nearly all of `before` is; else empty.
+
+    `small`: `after` with the scatter between replicates counted as noise."""
     if (small.fit if small.held_out is None else small.held_out) <= MOST:
-        return True
-    before = gap_of(choice.base.fit, held_out)
+        return "small_gap"
     pairs = ((before.fit, after.fit), (before.held_out, after.held_out))
     shares = [1 - (b - 1) / (a - 1) for a, b in pairs if a is not None and b is not None and a > 1]
-    return bool(shares) and min(shares) >= _CLOSED
+    return "closed" if shares and min(shares) >= _CLOSED else ""
 
 
 def undecided(choice: Choice) -> tuple[Hypothesis, ...]:

@@ -18,11 +18,12 @@ from experiments.diagnose.noise.colour import Colour
 from experiments.diagnose.noise.jitter import Jitter
 from experiments.diagnose.noise.replicates import groups_of
 from experiments.diagnose.noise.spectrum import Line, lines_of
+from vis.page.numbers import foldable, quote
 from vis.page.sentences import Sentences
 
-from .deciding import Gap, certain, closes, gap_of, smallest, unscattered, values_of_all
+from .deciding import Gap, certain, closes, gap_of, is_misfit_of_form, smallest, unscattered, values_of_all
 from .effect_texts import confirmation
-from .matters import undecided
+from .matters import is_small, little_left, undecided
 from .next_steps import after_unknown
 from .renoised import scatter_of, wander_of
 from .rivals import LEAD, Predicted, Rival, marked
@@ -139,6 +140,21 @@ class Diagnosis(Known):
     def gap_with_scatter(self) -> ScatterGap | None:
         """The gap against the scatter of replicates; None where they differ by the sensors' noise alone."""
         return gap_with_scatter(self.problem, self.model_std, self._stages, self.fitted, self.held_out)
+
+    @property
+    def allowed_by(self) -> str:
+        """The first rule of docs/diagnose.md, "What matters", that lets the verdict pass; empty for `unknown`."""
+        weighed, gates = self.gap_with_scatter, (self.gate_after, self.gate_held_out)
+        small = self.after if weighed is None else Gap(*weighed.after)
+        of_chance = "chance" if all(gate is None or gate.passed for gate in gates) else ""
+        if self.verdict == "none":
+            return "small_gap" if is_small(small, len(self.fitted), len(self.held_out)) else of_chance
+        if self.choice is None or self.verdict == "unknown":
+            return ""
+        if known := little_left(self.before, self.after, small) or of_chance:
+            return known
+        late = "" if self.problem.contacts is None else "late"
+        return "form" if is_misfit_of_form(self.choice, self.held_out) else late
 
     @cached_property
     def gap_with_fitted_scatter(self) -> ScatterGap | None:
@@ -374,7 +390,7 @@ def _inflations(one: Fit, other: Fit) -> tuple[float, float]:
 
 def _with_error(force: float, std: float) -> str:
     """0.112 ± 0.008 N; a force that the model gives exactly has no error."""
-    return f"{force:.3g} ± {std:.2g} N" if std > 0 else f"{force:.3g} N"
+    return foldable(quote(force, std or None, "N"))
 
 
 def _between(one: Fit) -> Array:

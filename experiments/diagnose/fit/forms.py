@@ -42,7 +42,8 @@ def plain_form(effect: str, form: declared.Form, bends: Sequence[declared.Bend])
     return Form(
         effect=effect, name=form.name, parameters=parameters, amplitude=names[0], numbers=form.numbers,
         starts=tuple(dict(zip(names, start, strict=True)) for start in form.starts), redefines=form.redefines,
-        form_std=form.form_std, becomes=form.becomes, bends=tuple(bend for bend in bends if form.name in bend.of),
+        stiffness=form.stiffness, form_std=form.form_std, becomes=form.becomes,
+        bends=tuple(bend for bend in bends if form.name in bend.of),
     )  # fmt: skip
 
 

@@ -87,6 +87,7 @@ class Form:
     redefines: tuple[str, ...] = ()
     """Base parameters that mean another thing beside this form (a straight spring's slope is not that of a bent one
     at its beginning): what was stated of them is no measure of it."""
+    stiffness: str = ""  # what K is beside this form, where it redefines it
     numbers: tuple[Number, ...] = ()  # of the term (tumbles) or of the law (pushes), as the effect's file declares them
     bends: tuple[Bend, ...] = ()  # what may bend it
     form_std: float = 0.0  # of the amplitude, relative: how far nature's law lets it be another number than the form's
@@ -326,12 +327,11 @@ class Problem(Protocol):
 
     def write_model(
         self, path: str, values: Values, forms: Sequence[Form], base: Values | None = None,
-        errors: Mapping[str, object] | None = None, scatter: Mapping[str, float] | None = None,
+        notes: Mapping[str, Mapping[str, object]] | None = None,
     ) -> None:  # fmt: skip
         """model.toml: the tables with the fitted values, and [[effect]] tables. `base`: values of the base model that
-        was fitted without these effects, which a comparison needs. `errors`: of the values, a note
-        (`Diagnosis.joint_errors`). `scatter`: by what trials of one condition differ (`Diagnosis.known_scatter`), which
-        is noted of pushes."""
+        was fitted without these effects, which a comparison needs. `notes`: further ones, by name, such as the errors
+        of the values."""
 
     def next_experiment(self, first: Form, second: Form, values: Values) -> str:
         """One sentence: the trial or bench measurement that would distinguish the two."""

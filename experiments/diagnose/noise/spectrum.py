@@ -19,6 +19,7 @@ from scipy import signal, stats
 from experiments.diagnose.fit.gaps import unit_of
 from experiments.diagnose.fit.localise import phases_of
 from experiments.diagnose.fit.problem import Array, Form, Problem, Values
+from vis.page.numbers import beside
 
 __all__ = ["Line", "Part", "Piece", "line_rows", "line_sentence", "lines_of", "spectral_lines"]
 
@@ -252,14 +253,19 @@ def line_rows(lines: Sequence[Line]) -> list[dict[str, Any]]:
 def line_sentence(row: Mapping[str, Any]) -> str:
     """A row of ``latent.lines`` in words."""
     shown = row["channels"][:_SHOWN]
-    sizes = ", ".join(f"{p['channel']} {p['amplitude']:.2g} ± {p['std']:.1g} {p['unit']}".rstrip() for p in shown)
+    sizes = ", ".join(f"{p['channel']} {_with_error(p['amplitude'], p['std'])} {p['unit']}".rstrip() for p in shown)
     more = len(row["channels"]) - len(shown)
     also = f" and in {more} more" if more else ""
     phases = sorted(shown[0]["phases"].items(), key=lambda pair: -pair[1])
     where = ", ".join(f"{size:.2g} in phase {name}" for name, size in phases) if len(phases) > 1 else ""
     odds = "below 1e-6" if row["chance"] < 1e-6 else f"{row['chance']:.1g}"
     return (
-        f"Its spectrum has a line at {row['frequency_hz']:.4g} ± {row['std_hz']:.1g} Hz: amplitudes {sizes}{also}"
+        f"Its spectrum has a line at {_with_error(row['frequency_hz'], row['std_hz'])} Hz: amplitudes {sizes}{also}"
         + (f" ({shown[0]['channel']}: {where})" if where else "")
         + f"; by chance, in noise of that colour, {odds}."
     )
+
+
+def _with_error(value: float, std: float) -> str:
+    """Both to the digits that the error allows: 12.34 ± 0.04."""
+    return f"{beside(value, std)} ± {beside(std, std)}"

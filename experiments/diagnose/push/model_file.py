@@ -24,22 +24,18 @@ Pairs = dict[str, dict[str, float]]
 
 def model_of(
     tables: PenetrationCampaign, middle: float, pairs: Pairs, plain: Pairs, effects: Sequence[EffectTable],
-    covered: Mapping[str, Any], errors: Mapping[str, object] | None = None, scatter: Mapping[str, float] | None = None,
+    covered: Mapping[str, Any], more: Mapping[str, Mapping[str, object]],
 ) -> PenetrationModel:  # fmt: skip
     """The tables of model.toml. `middle`: the diameter [m] whose K and C stand in [surface]; `pairs`: K and C beside
     the effects; `plain`: those of the base model that was fitted without effects, empty where there are none;
-    `covered`: the range of the campaign's trials (`range_of`), noted; `errors`: of the fitted numbers, noted too;
-    `scatter`: by what trials of one condition differ, noted where it is known."""
+    `covered`: the range of the campaign's trials (`range_of`), noted; `more`: further notes, by name."""
     ours = (BASE_NOTE, RANGE_NOTE, ERRORS_NOTE, SCATTER_NOTE, OTHERS_NOTE, PEAKS_NOTE)
     notes: dict[str, Any] = {name: note for name, note in tables.notes.items() if name not in ours}
-    if errors:
-        notes[ERRORS_NOTE] = dict(errors)
+    notes |= {name: dict(note) for name, note in more.items()}
     if plain:
         notes[BASE_NOTE] = plain
     if covered:
         notes[RANGE_NOTE] = dict(covered)
-    if scatter is not None:
-        notes[SCATTER_NOTE] = dict(scatter)
     if len(pairs) > 1:
         notes["fitted_by_diameter"] = pairs
     same = {name: getattr(tables, name) for name in ("format", "kind", "name", "uncertainty", "sensors")}

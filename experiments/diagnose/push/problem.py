@@ -42,7 +42,7 @@ from .forms import physical, push_forms, unit_of
 from .law import PHASES, SLOTS, fall, push, slot_places, slot_table
 from .model_file import Pairs, model_of, range_of
 from .parameters import base_parameters, comes_back, diameters_of, find_scales, named, speeds_of
-from .remarks import SURE, Push, contradict, facts, highest_dampings, how_to_determine
+from .remarks import SURE, Push, at_one_speed, contradict, facts, highest_dampings, how_to_determine
 from .zeros import find_force_zeros
 
 __all__ = ["PenetrationProblem", "make_problem"]
@@ -417,7 +417,7 @@ class PenetrationProblem(Problem):
 
     def write_model(
         self, path: str, values: Values, forms: Sequence[Form], base: Values | None = None,
-        errors: Mapping[str, object] | None = None, scatter: Mapping[str, float] | None = None,
+        notes: Mapping[str, Mapping[str, object]] | None = None,
     ) -> None:  # fmt: skip
         """See `Problem`. Of several diameters the middle one stands in [surface] and [spike], all in [notes]. A trial
         without a diameter gets that of the campaign's [spike]."""
@@ -429,7 +429,7 @@ class PenetrationProblem(Problem):
             for form in forms
         )  # fmt: skip
         pairs = (self._pairs(values), self._pairs(base) if forms and base is not None else {})
-        model = model_of(self.tables, self._middle, *pairs, effects, self.covered, errors, scatter)
+        model = model_of(self.tables, self._middle, *pairs, effects, self.covered, notes or {})
         write_model(Path(path), model)
 
     def _pairs(self, values: Values) -> Pairs:
@@ -452,12 +452,11 @@ class PenetrationProblem(Problem):
     def undetermined(
         self, values: Values, forms: Sequence[Form], trials: Sequence[str], errors: Mapping[str, float | None]
     ) -> tuple[str, ...]:
-        """C of each diameter that is less than `SURE` errors above 0, or of all where pushes contradict one another."""
-        pushes, names = (
-            self._pushes(values, forms, trials),
-            [named("damping", d, self._diameters) for d in self._diameters],
-        )
-        if pushes and contradict(pushes, [form.effect for form in forms]):
+        """C of each diameter that is less than `SURE` errors above 0, or of all where pushes contradict one another or
+        have one speed."""
+        pushes = self._pushes(values, forms, trials)
+        names = [named("damping", diameter, self._diameters) for diameter in self._diameters]
+        if pushes and (at_one_speed(pushes) or contradict(pushes, [form.effect for form in forms])):
             return tuple(names)
         found = [(name, values.get(name, 0.0), errors.get(name)) for name in names if pushes]
         return tuple(name for name, damping, error in found if error is None or damping < SURE * error)

@@ -10,9 +10,12 @@ from experiments.diagnose.fit.gaps import numeral
 from experiments.diagnose.fit.problem import Array
 from rigid.intervals import student
 
-__all__ = ["Push", "SURE", "contradict", "facts", "highest_damping", "highest_dampings", "how_to_determine"]
+__all__ = [
+    "Push", "SURE", "at_one_speed", "contradict", "facts", "highest_damping", "highest_dampings", "how_to_determine",
+]  # fmt: skip
 
 _FAST = 0.8  # of the largest speed from which on a push is one of the fastest
+_ONE_SPEED = 1.1  # of two speeds that are one to a damper: C v is then as good as a constant force
 SURE = 2.0  # standard errors from which on a C is sure
 ONE_SIDED = 0.9  # two-sided: above each end are 5 %
 
@@ -51,6 +54,13 @@ def contradict(pushes: Sequence[Push], added: Sequence[str]) -> bool:
     negative in another. A straight spring in the place of a bent one would give C what the bend does."""
     straight, bent = _each(pushes, added)
     return len({c > 0 for _, c, s in bent or straight if abs(c) >= SURE * s}) > 1
+
+
+def at_one_speed(pushes: Sequence[Push]) -> bool:
+    """Whether nine of ten readings in the ground are at one speed, downwards: no hold, no withdrawal, no other pace."""
+    speeds = np.concatenate([push.speed[push.depth > 0] for push in pushes])
+    slowest, fastest = np.percentile(speeds, [5, 95]) if len(speeds) else (0.0, 0.0)
+    return bool(slowest > 0 and fastest <= _ONE_SPEED * slowest)
 
 
 def highest_damping(pushes: Sequence[Push]) -> float | None:

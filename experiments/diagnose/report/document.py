@@ -11,15 +11,14 @@ series/<trial>.<channel>.csv    t_s,measured,before,after,std,std_after,phase (a
 
 import math
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from experiments.campaign import read_model, write_model
-from experiments.campaign.tables import OTHERS_NOTE, PEAKS_NOTE
+from experiments.campaign.tables import ERRORS_NOTE, OTHERS_NOTE, PEAKS_NOTE, SCATTER_NOTE
 from experiments.diagnose.core.effect_texts import SYMBOLS, equations_of, with_comments
 from experiments.diagnose.core.near import Near, near_models, nearest_each
 from experiments.diagnose.core.outcome import Diagnosis, Estimated
@@ -64,6 +63,8 @@ def document(found: Diagnosis, near: Sequence[Near] | None = None) -> dict[str, 
         diagnosis["gap_with_scatter"] = {
             stage: {"fit": fitted, "held_out": held_out} for stage, (fitted, held_out) in stages.items()
         } | {"freedom": weighed.freedom}
+    if rule := found.allowed_by:
+        diagnosis["allowed_by"] = rule
     if found.verdict == "unknown":
         diagnosis["leading"] = _leading(found)
         diagnosis["left"] = [asdict(p) for p in found.left]
@@ -236,7 +237,12 @@ def write_diagnosis(folder: Path, found: Diagnosis) -> dict[str, Any]:
         write_series(folder / "latent.csv", found.latent())
     diagnosis["near_models"] = _write_near_models(folder, found, near)
     notes: dict[str, Json] = {}
-    if problem.kind == "penetration" and (ratios := peak_ratios(found)) is not None:
+    used, aside = {*found.fitted, *found.held_out}, []
+    modelled = {trial.id: problem.compare(found.best_values, found.forms, trial.id) for trial in problem.trials}
+    if (
+        problem.kind == "penetration"
+        and (ratios := peak_ratios([modelled[id] for id in (*found.fitted, *found.held_out)])) is not None
+    ):
         diagnosis["peaks"] = notes[PEAKS_NOTE] = ratios
     if others := [one["file"] for one in diagnosis["near_models"]]:
         notes[OTHERS_NOTE] = {"files": others}
@@ -246,10 +252,9 @@ def write_diagnosis(folder: Path, found: Diagnosis) -> dict[str, Any]:
             "candidate": [r["candidate"] for r in rows], "effects": [" + ".join(r["effects"]) for r in rows],
             "score": [r["score"] for r in rows], "excess_per_sample": [r["left"] for r in rows],
         })  # fmt: skip
-    gaps, used, aside = Gaps(), {*found.fitted, *found.held_out}, []
+    gaps = Gaps()
     for trial in problem.trials:
-        before = problem.compare(found.base_values, (), trial.id)
-        after = problem.compare(found.best_values, found.forms, trial.id)
+        before, after = problem.compare(found.base_values, (), trial.id), modelled[trial.id]
         samples = problem.samples(trial.id)
         phases = phases_of(problem, found.base_values, (), trial.id)
         wide = scatter_std(problem, found.model_std, found.best_values, found.forms, trial.id)
@@ -283,12 +288,12 @@ def write_diagnosis(folder: Path, found: Diagnosis) -> dict[str, Any]:
     return diagnosis
 
 
-def peak_ratios(found: Diagnosis) -> Json | None:
+def peak_ratios(trials: Iterable[Mapping[str, Mapping[str, Array]]]) -> Json | None:
     """Force at the deepest reading of each push, measured over modelled: mean, standard deviation, lowest, highest and
-    the number of `trials`, those held out too. None for fewer than three pushes."""
+    the number of `trials`, as `Problem.compare` has them. None for fewer than three pushes."""
     ratios = []
-    for trial in (*found.fitted, *found.held_out):
-        force = found.problem.compare(found.best_values, found.forms, trial).get("force", {})
+    for channels in trials:
+        force = channels.get("force", {})
         if "depth_m" not in force or not np.isfinite(force["depth_m"]).any():
             continue
         near = slice(max((place := int(np.nanargmax(force["depth_m"]))) - _BESIDE, 0), place + _BESIDE + 1)
@@ -307,10 +312,12 @@ def _write_model(path: Path, found: Diagnosis, notes: Mapping[str, Json] | None 
     `notes`: further ones of a model of pushes, by name.
     """
     errors = found.joint_errors()
-    found.problem.write_model(str(path), found.best_values, found.forms, found.base_values, errors, found.known_scatter)
-    if notes and found.problem.kind == "penetration":
-        model = read_model(path)
-        write_model(path, model.model_copy(update={"notes": {**model.notes, **notes}}))
+    noted: dict[str, Json] = {ERRORS_NOTE: errors} if errors else {}
+    if found.problem.kind == "penetration":
+        noted |= notes or {}
+        if (scatter := found.known_scatter) is not None:
+            noted[SCATTER_NOTE] = scatter
+    found.problem.write_model(str(path), found.best_values, found.forms, found.base_values, noted)
     text = with_comments(path.read_text(encoding="utf-8"), _equations(found), found.problem.kind)
     write_text(path, text)
     return errors

@@ -103,7 +103,7 @@ def summary_sentences(diagnosis: Mapping[str, Any]) -> list[str]:
     else:
         first = [*sure_sentences(diagnosis), *worse_sentences(diagnosis)]
     if diagnosis["verdict"] != "unknown":
-        first += _residue(diagnosis)
+        first += [*_residue(diagnosis), *_allowed(diagnosis)]
     aside = list(dict.fromkeys(row["trial"] for row in diagnosis.get("set_aside", [])))
     apart = [say("took_no_part", trials=", ".join(aside))] if aside else []
     use = [*use_sentences(diagnosis), *law_sentences(diagnosis)]
@@ -149,6 +149,21 @@ def _residue(diagnosis: Mapping[str, Any]) -> list[str]:
         names = " and ".join(f"{bound['parameter']} ({bound['sigmas']:+.1f} sigma)" for bound in far)
         sentences.append(say("absorbs", names=names))
     return sentences
+
+
+def _allowed(diagnosis: Mapping[str, Any]) -> list[str]:
+    """The rule that lets the verdict pass; a folder of an older hedgebed has none."""
+    if "allowed_by" not in diagnosis:
+        return []
+    held_out = diagnosis["gap"]["after"]["held_out"] is not None
+    both = held_out and (diagnosis["allowed_by"] != "chance" or "held_out" in diagnosis["gate"])
+    rule = say(
+        f"allowed_{diagnosis['allowed_by']}",
+        held_out="held-out " if held_out else "",
+        with_scatter=say("with_scatter_as_noise") if "gap_with_scatter" in diagnosis else "",
+        on_both=say("on_both_parts" if both else "on_fitted"),
+    )
+    return [say("allowed", rule=rule)]
 
 
 def _doubts(diagnosis: Mapping[str, Any]) -> list[str]:

@@ -4,9 +4,9 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from experiments.campaign.model_errors import is_biased
+from experiments.campaign.model_errors import bias_words
 from experiments.diagnose.fit.gaps import numeral
-from vis.diagnose.usable import has_numbers_to_use, secant_depth
+from vis.diagnose.usable import has_numbers_to_use, secant_depth, stiffness_words
 from vis.page.numbers import foldable, quote
 
 from .sentences import say
@@ -33,7 +33,9 @@ def use_sentences(diagnosis: Mapping[str, Any]) -> list[str]:
     each = say("one_k_each") if len(stiffnesses) > 1 else ""
     is_open = [name for name, entry in after.items() if name.startswith("damping") and entry["std"] is None]
     depth = secant_depth(diagnosis)
-    secant, of_depth = ("", "") if depth is None else (say("secant", depth_mm=1e3 * depth), say("of_depth"))
+    meant = stiffness_words(diagnosis)
+    secant = f" ({meant})" if meant else ""
+    of_depth = "" if depth is None else say("of_depth")
     sentence = say("use", numbers=", ".join(shown), secant=secant, beside=beside, each=each, of_depth=of_depth)
     bounds = "".join(_bound(name, after[name]["at_most"]) for name in is_open[:_SHOWN] if "at_most" in after[name])
     covered = diagnosis.get("covered", {})
@@ -90,13 +92,8 @@ def law_sentences(diagnosis: Mapping[str, Any]) -> list[str]:
 
 def peak_sentences(diagnosis: Mapping[str, Any]) -> list[str]:
     """That the model is too low or too high where pushes are deepest, by more than chance; none where it is not."""
-    peaks = diagnosis.get("peaks")
-    if not peaks or not is_biased(peaks):
-        return []
-    ends = [f"{100 * (peaks[key] - 1):+.2g}" for key in ("lowest", "highest")]
-    side = "low" if peaks["mean"] > 1 else "high"
-    mean = f"{100 * (peaks['mean'] - 1):+.2g}"
-    return [say("peaks_off", trials=peaks["trials"], low=ends[0], high=ends[1], mean=mean, side=side)]
+    words = bias_words(diagnosis.get("peaks"))
+    return [] if words is None else [say("peaks_off", **words)]
 
 
 def unloading_sentences(diagnosis: Mapping[str, Any]) -> list[str]:

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.campaign import Campaign, EffectTable, TumbleModel, write_model
-from experiments.campaign.tables import ERRORS_NOTE
 from experiments.diagnose.core.effect_texts import advice
 from experiments.diagnose.fit.fitting import SCAN
 from experiments.diagnose.fit.forms import OwnEffect, shapes_of
@@ -285,7 +284,7 @@ class TumbleProblem(Problem):
 
     def write_model(
         self, path: str, values: Values, forms: Sequence[Form], base: Values | None = None,
-        errors: Mapping[str, object] | None = None, scatter: Mapping[str, float] | None = None,
+        notes: Mapping[str, Mapping[str, object]] | None = None,
     ) -> None:  # fmt: skip
         """model.toml, which `hedgebed tumble --model` runs."""
         tables = self.data.tables
@@ -299,7 +298,7 @@ class TumbleProblem(Problem):
             mine |= {name: value for name, (value, _) in self.reported(values, form).items() if math.isfinite(value)}
         model = TumbleModel(
             **tables.model_dump(include={"format", "kind", "name"}),
-            notes={**tables.notes, **({ERRORS_NOTE: dict(errors)} if errors else {})},
+            notes={**tables.notes, **{name: dict(note) for name, note in (notes or {}).items()}},
             platform=tables.platform.model_copy(update={name: numbers[name] for name in ("mass", "inertia")}),
             surface=tables.surface.model_copy(update={name: numbers[name] for name in SHARED[2:]}),
             wheel=tables.wheel, rig=tables.rig, uncertainty=tables.uncertainty, sensors=tables.sensors,

@@ -92,9 +92,9 @@ def push_loading(
 
 
 def _form(name: str, how: str, std: float, lowest: float, highest: float, starts: fit.Starts, equation: str,
-          *more: fit.Number, slot: str = "") -> fit.Form:  # fmt: skip
+          *more: fit.Number, slot: str = "", stiffness: str = "slope at the surface") -> fit.Form:  # fmt: skip
     first = fit.amplitude(f"hardening_{slot or name}", how, std, lowest, highest)
-    return fit.Form(name, (first, *more), starts, equation, redefines=("stiffness",))
+    return fit.Form(name, (first, *more), starts, equation, redefines=("stiffness",), stiffness=stiffness)
 
 
 CANDIDATE = fit.Candidate(
@@ -109,7 +109,8 @@ CANDIDATE = fit.Candidate(
     push=fit.Push(
         rank=10, law={"loading": push_loading}, lengths={"hardening_reach": 1e-3},
         forms=(
-            _form("power", "plain", 0.6, -0.9, 3.0, ((0.2,), (-0.2,)), "K * z * (z / D)^hardening_power"),
+            _form("power", "plain", 0.6, -0.9, 3.0, ((0.2,), (-0.2,)), "K * z * (z / D)^hardening_power",
+                  stiffness="F / z at z = D"),
             _form("quadratic", "plain", 0.8, -0.6, 20.0, ((0.3,), (-0.2,)),
                   "K * z * (1 + hardening_quadratic * z / D)"),
             _form("cubic", "plain", 0.8, -0.4, 20.0, ((0.3,), (-0.15,)), "K * z * (1 + hardening_cubic * (z / D)^2)"),
@@ -120,7 +121,7 @@ CANDIDATE = fit.Candidate(
                   "K * z / max(1 - hardening_locking * z / D, 0.05)"),
             _form("early", "spring force", 0.5, 0.0, 20.0, ((0.1, -2.5), (0.2, -1.0)),
                   "K * z + hardening_early * (1 - exp(-z / hardening_reach))",
-                  fit.between("hardening_reach", "depth", -4.0, 0.0)),
+                  fit.between("hardening_reach", "depth", -4.0, 0.0), stiffness="slope far below hardening_reach"),
             # Towards a bound, a hyperbola (Kondner, J. Soil Mech. Found. Div. 89 (1963), 115) where the sharpness is 1.
             _form("levelling off", "plain", 0.8, 0.0, 20.0, ((0.3, 1.5), (1.0, 1.5)),
                   "K * z / (1 + x^hardening_sharpness)^(1 / hardening_sharpness), x = hardening_level * z / D",

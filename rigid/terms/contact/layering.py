@@ -31,7 +31,9 @@ def _form(name: str, slot: str, how: str, std: float, lowest: float, highest: fl
           edge: Number, width: Number) -> Form:  # fmt: skip
     first = amplitude(slot, how, std, lowest, highest)
     becomes = () if name == "crust" else (("depth-hardening", reaches_surface),)
-    return Form(name, (first, edge, width), starts, equation, redefines=("stiffness",), becomes=becomes)
+    stiffness = "above the layer" if slot in ("layer_slope", "layer_factor") else f"without the {name}"
+    return Form(name, (first, edge, width), starts, equation, redefines=("stiffness",), stiffness=stiffness,
+                becomes=becomes)  # fmt: skip
 
 
 def _starts(sizes: tuple[float, ...], depths: tuple[float, ...], width: float) -> Starts:

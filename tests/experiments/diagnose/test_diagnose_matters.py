@@ -8,6 +8,7 @@ from penetration_campaigns import DEPTH_STD, FORCE_STD, campaign_of, driven_tria
 
 from experiments.check.replicas import pace_of
 from experiments.diagnose.core import matters
+from experiments.diagnose.core.deciding import Gap
 from experiments.diagnose.core.diagnosis import diagnose
 from experiments.diagnose.fit.fitting import Model, Whitener, fit
 from experiments.diagnose.push.problem import make_problem
@@ -53,6 +54,22 @@ def test_a_structural_residue_too_small_to_matter_is_no_verdict_of_unknown():
     assert not found.gate_before.passed  # the sensors can tell
     assert (found.verdict, found.effects) == ("none", ())
     assert 1.0 < found.before.fit <= matters.MOST
+    assert found.allowed_by == document(found)["allowed_by"] == "small_gap"
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "with_scatter", "rule"),
+    [
+        ((40.0, 30.0), (1.3, 1.19), (1.3, 1.19), "small_gap"),
+        ((40.0, 30.0), (3.0, 2.5), (1.1, 1.0), "small_gap"),
+        ((201.0, 101.0), (2.9, 1.9), (2.9, 1.9), "closed"),
+        ((201.0, 101.0), (2.9, 2.2), (2.9, 2.2), ""),
+        ((201.0, None), (1.1, None), (1.1, None), "small_gap"),
+    ],
+)
+def test_a_name_passes_by_what_it_leaves_or_by_what_it_closes(before, after, with_scatter, rule):
+    """At most 1.2 held out; or (after - 1) / (before - 1) of 1 % at most: 1.9 / 200, 0.9 / 100, but not 1.2 / 100."""
+    assert matters.little_left(Gap(*before), Gap(*after), Gap(*with_scatter)) == rule
 
 
 def test_numbers_that_went_far_count_as_stated_only_where_nearer_ones_do_as_well():

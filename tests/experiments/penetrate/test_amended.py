@@ -215,9 +215,9 @@ def test_one_push_is_predicted_alone_as_it_was_asked_for(tmp_path, capsys):
     shown, result = capsys.readouterr().out, json.loads((tmp_path / "run" / "result.json").read_text())
     assert [run["kind"] for run in result["runs"]] == ["driven"] and result["warnings"] == []
     assert not any(name.startswith("sinkage") for name in result["quantities"])
-    assert re.search(r"1\.2 N\s+0\.2 N", shown)  # K z + C v, and 1.96 z times the error of K, 0.12 N
+    assert re.search(r"1\.22 N\s+0\.23 N", shown)  # K z + C v, and 1.96 z times the error of K, 0.12 N (0.2348)
     assert "95 % interval" in shown and "not in it" in " ".join(shown.split())
-    assert "0.2&nbsp;N" in (page := (tmp_path / "run" / "report.html").read_text()) or "0.2\xa0N" in page
+    assert "0.23&nbsp;N" in (page := (tmp_path / "run" / "report.html").read_text()) or "0.23\xa0N" in page
     again = PenetrateSettings(ground="spring-damper", model=str(tmp_path / "model.toml"), speeds=(0.02,), load=0.1)
     assert again.retreat_speed == 0.02 and {unit.kind for unit in plan_units(again)} == {"driven", "set_down"}
 

@@ -101,7 +101,7 @@ def test_departures_are_said_by_depth_and_speed():
     models = {"a": drive(SPIKE, into=law, speed=0.1, depth=0.02)}
     found = departures([driven], models, {"a": driven[0]}, fit, sinkage=((0.002, 0.0003), (0.003, None)))
     text = " ".join(found["sentences"])
-    for words in ("top 5 mm", "too hard at", "too softly at", "2.0 ± 0.3", "3.0 mm, 50 %", "recovers 100 %."):
+    for words in ("top 5 mm", "too hard at", "too softly at", "2.00 ± 0.30", "3.0 mm, 50 %", "recovers 100 %."):
         assert words in text, words
     (costly,) = sentences([], {}, (-0.003, 0.68), [], None)
     assert "another 0.3 %" in costly

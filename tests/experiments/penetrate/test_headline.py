@@ -80,7 +80,7 @@ def test_a_law_without_a_bed_stands_beside_the_spring_damper():
     }
     result = {"experiment": "penetrate", "ground": "spring-damper", "model": {"effects": ["a"]}, "quantities": numbers}
     shown = penetrate_headline(result)
-    assert [row[1:] for row in shown.rows] == [("1.5 N", "0.2 N", "1.0 N"), ("2.0 %", "–", "")]
+    assert [row[1:] for row in shown.rows] == [("1.50 N", "0.20 N", "1.0 N"), ("2.0 %", "–", "")]
     assert "95" in shown.head[2] and "95 %" in shown.notes[-1]
 
 

@@ -68,6 +68,13 @@ def test_real_sand_is_expected_between_a_law_and_grains_and_the_range_holds_both
     assert f"inertia=2 ({word} 10" in forms.words[0] and f"({word} 7.0 m)" in forms.words[0]
     assert "Real sand" in laws.words[0] and "'bed'" in laws.words[0]
     assert with_grains(NO_FORMS, own) == NO_FORMS
+    landings = [any("--duration" in words and "0.12 s" in words for words in one.words) for one in (laws, forms)]
+    assert landings == [True, True] and laws.numbers["duration"] == forms.numbers["duration"] == 0.12
+
+
+def test_a_robot_that_leaves_no_law_has_no_later_landing():
+    still = dict.fromkeys(ANSWER, 0.05) | {"longest_flight": 0.0}
+    assert not any("--duration" in words for words in forms_of(planned(), still, lambda _: still, sure={}).words)
 
 
 def named(plan):

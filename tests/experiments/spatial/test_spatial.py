@@ -12,6 +12,7 @@ from tumble_runs import stop_at
 from experiments.cli.main import main
 from experiments.runs.folder import RunFolder, read_series
 from experiments.spatial import experiment as spatial
+from experiments.spatial import spread
 from experiments.spatial.on_grains import SpatialFollowed, SpatialOnBed
 from experiments.spatial.settings import SpatialSettings
 from experiments.spatial.spread import add_spread, uncertain_in
@@ -281,7 +282,7 @@ def test_the_wheels_columns_are_of_the_axes_that_they_turn_about(tmp_path, monke
     assert not motion["wheel_x_rad_s"].any() and not motion["wheel_z_rad_s"].any()
 
 
-def test_a_standard_deviation_of_k_and_c_changes_the_answer_of_a_run_in_space():
+def test_a_standard_deviation_of_k_and_c_changes_the_answer_of_a_run_in_space(monkeypatch):
     """x = 3 K + C: std = hypot(3 std_K, std_C). A hop that a moved law does not have is named, and has no error."""
     plan = plan_spatial(SpatialSettings(surface="sand"))
     stds = {one.name: one.std for one in uncertain_in(plan)}
@@ -295,9 +296,10 @@ def test_a_standard_deviation_of_k_and_c_changes_the_answer_of_a_run_in_space():
         assert law == {name: other.numbers[name].value for name in stds}
         hops = None if law["stiffness"] < plan.numbers["stiffness"].value else 0.3
         answer = {"max_speed": 3 * law["stiffness"] + law["damping"], "transition_angle_hop": hops}
-        return SimpleNamespace(run=lambda: None, answer=answer)
+        return SimpleNamespace(run=lambda: None, answer={name: {"value": value} for name, value in answer.items()})
 
-    add_spread(plan, result, run_on, answer_of=lambda run: run.answer)
+    monkeypatch.setattr(spread, "quantities_of", lambda run: run.answer)
+    add_spread(plan, result, run_on)
     expected = math.hypot(3 * stds["stiffness"], stds["damping"])
     assert result["quantities"]["max_speed"]["std"] == pytest.approx(expected)
     assert result["quantities"]["transition_angle_hop"]["std"] is None

@@ -5,7 +5,7 @@ import pytest
 
 from experiments.diagnose.push.remarks import Push, facts
 from experiments.diagnose.report.sentences import size_sentences
-from experiments.diagnose.report.summary import summary_sentences, title_words
+from experiments.diagnose.report.summary import _allowed, summary_sentences, title_words
 from experiments.diagnose.report.to_use import number_words, unloading_sentences
 
 SIZE = {"channel": "force", "unit": "N", "rms": 0.66, "most": 2.6, "share": 0.083}
@@ -41,6 +41,25 @@ def test_what_held_out_trials_say_of_a_prediction_is_in_newtons(gap, predicts):
     (words,) = [sentence for sentence in summary_sentences(found) if sentence.startswith("How well it predicts")]
     assert "0.23 N" in words and "by 3.9" in words and predicts in words
     assert "decides nothing" not in " ".join(summary_sentences(found))
+
+
+@pytest.mark.parametrize(
+    ("rule", "held_out", "more", "words"),
+    [
+        ("small_gap", 1.1, {}, "the held-out gap is at most 1.2 ("),
+        ("small_gap", None, {"gap_with_scatter": {}}, "the gap is at most 1.2, with the scatter"),
+        ("closed", 5.0, {}, "remains on fitted and on held-out"),
+        ("chance", 1.3, {"gate": {"held_out": {}}}, "on fitted and on held-out"),
+        ("chance", 1.3, {"gate": {}}, "chance on fitted trials ("),
+        ("form", 1.3, {}, "less than 2 %"),
+        ("late", 1.3, {}, "before they depart"),
+    ],
+)
+def test_the_rule_that_lets_a_verdict_pass_is_stated(rule, held_out, more, words):
+    found = {"allowed_by": rule, "gap": {"after": {"fit": 1.1, "held_out": held_out}}, **more}
+    (said,) = _allowed(found)
+    assert words in said and "What matters" in said
+    assert _allowed({"gap": found["gap"]}) == []
 
 
 def test_a_foots_diameter_is_not_said_like_a_depth():

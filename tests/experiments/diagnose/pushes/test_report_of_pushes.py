@@ -1,10 +1,10 @@
 """Pushes of two plates, one of them with another zero of the depth: what is said of it, of K and C, and what next."""
 
 import json
+import re
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -21,7 +21,8 @@ from experiments.diagnose.core.rivals import folds_of, predict
 from experiments.diagnose.experiment import diagnose_campaign
 from experiments.diagnose.fit.evidence import Hypothesis
 from experiments.diagnose.fit.fitting import fit, settled
-from experiments.diagnose.push.remarks import Push, contradict, highest_damping
+from experiments.diagnose.push.problem import make_problem
+from experiments.diagnose.push.remarks import Push, at_one_speed, contradict, highest_damping
 from experiments.diagnose.report.document import COUNTS, _write_model, _write_near_models, document, peak_ratios
 from experiments.diagnose.report.gaps import Gaps
 from experiments.diagnose.report.sentences import behind_words
@@ -30,6 +31,7 @@ from experiments.diagnose.report.to_use import peak_sentences, use_sentences
 from experiments.diagnose.settings import DiagnoseSettings
 from rigid.series import read_series
 
+SHARES = (1.04, 1.06, 1.08, 1.10)
 OFF = 0.4e-3
 """By which the depth of trial n2 is too large [m]."""
 STIFFNESS = {0.06: 5500.0, 0.08: 9000.0}
@@ -125,7 +127,7 @@ def test_what_was_set_aside_is_in_no_gap_and_in_a_table_of_its_own(result):
     for rows in (said["by_phase"], said["by_condition"]):
         assert max(row["after"] for row in rows) < 1.3
     assert "n2" not in {trial for row in said["by_condition"] for trial in row["trials"]}
-    assert said["residue"] == []
+    assert said["residue"] == [] and said["allowed_by"] == "small_gap"
 
 
 def test_the_force_of_an_effect_is_that_of_the_law_where_it_is_largest(result):
@@ -174,10 +176,14 @@ def test_there_is_one_k_to_use_for_each_plate_before_all_else(result):
 
 
 def test_a_c_that_these_pushes_leave_open_has_no_error_and_an_experiment(result):
-    found, said, _ = result
+    found, said, folder = result
     for stage in ("before", "after"):
         assert said["base"][stage]["damping@0.06"]["std"] is None
         assert found["quantities"][f"damping@0.08_{stage}"]["std"] is None
+    most = found["quantities"]["damping@0.06_after"]["at_most"]
+    assert most == said["base"]["after"]["damping@0.06"]["at_most"]
+    cells = f"<td>below {most:.2g}</td><td>not determined</td>"
+    assert cells in re.sub(r"<td[^>]*>", "<td>", (folder / "report.html").read_text(encoding="utf-8"))
     assert "To determine C" in said["next_experiment"]
     assert "spike" not in said["next_experiment"]
 
@@ -196,6 +202,21 @@ def test_pushes_contradict_one_another_on_c_by_the_best_models_spring():
 
     assert not contradicting(3.0, 2.0, 0.0)
     assert contradicting(3.0, 2.0, -2.0)
+
+
+def test_pushes_of_one_speed_leave_c_open_whatever_its_error():
+    """C v is a constant force there; a hold, or another speed, tells it from one."""
+    time = np.linspace(0.0, 2.0, 200)
+    for speeds, is_open in (((0.005, 0.005), True), ((0.005, 0.0075), False)):
+        trials = []
+        for k, speed in enumerate(speeds):
+            columns = {"t_s": time, "depth_m": speed * time, "force_N": 900.0 * speed * time + 20.0 * speed}
+            trials.append((f"{k}", "driven", speed, Recording(columns)))
+        problem = make_problem(campaign_of(trials, doubt=(1.0, 1.0), depth_std=1e-5))
+        values, errors = {"stiffness": 900.0, "damping": 20.0}, {"stiffness": 1.0, "damping": 1.0}
+        assert problem.undetermined(values, (), ("0", "1"), errors) == (("damping",) if is_open else ())
+    held = Push(0.012, 0.005 * time, np.where(time < 1.5, 0.005, 0.0), time, time)
+    assert not at_one_speed([held]) and at_one_speed([replace(held, speed=np.full(200, 0.005))])
 
 
 def test_a_c_that_several_speeds_determine_keeps_its_error_though_no_push_shows_it_alone(tmp_path):
@@ -268,26 +289,15 @@ def test_a_model_below_every_measured_peak_is_told_with_by_how_much():
     """Four pushes, measured 4, 6, 8 and 10 % above the model at the deepest point; one without a depth is left out."""
     depth = np.array([0.0, 0.5, 1.0, 1.0, 1.0, 1.0, 1.0, 0.5]) * 0.01
 
-    def compare(values, forms, trial):
-        if trial == "blind":
-            return {"force": {"measured": depth, "model": depth}}
-        return {"force": {"depth_m": depth, "model": 1e3 * depth, "measured": (1 + 0.01 * float(trial)) * 1e3 * depth}}
-
-    found = SimpleNamespace(
-        fitted=("4", "6", "blind"),
-        held_out=("8", "10"),
-        best_values={},
-        forms=(),
-        problem=SimpleNamespace(compare=compare),
-    )
-    peaks = peak_ratios(found)
+    model, blind = 1e3 * depth, {"force": {"measured": depth, "model": depth}}
+    pushes = [{"force": {"depth_m": depth, "model": model, "measured": share * model}} for share in SHARES]
+    peaks = peak_ratios([*pushes, blind])
     assert (peaks["trials"], peaks["lowest"], peaks["highest"]) == (4, pytest.approx(1.04), pytest.approx(1.10))
     assert peaks["mean"] == pytest.approx(1.07) and peaks["std"] == pytest.approx(0.0258, rel=1e-2)
     (said,) = peak_sentences({"peaks": peaks})
     assert "too low" in said and "+4 to +10" in said and "+7 %" in said
     assert not peak_sentences({"peaks": peaks | {"std": 0.05}}) and not peak_sentences({})  # chance: 3.18 std / 2
-    found.held_out = ()
-    assert peak_ratios(found) is None
+    assert peak_ratios([*pushes[:2], blind]) is None
 
 
 def test_of_a_second_name_the_nearest_in_its_place_is_compared_by_prediction_too(diagnosed):
@@ -377,9 +387,11 @@ def test_a_k_of_a_power_of_depth_is_said_with_the_depth_it_belongs_to(result):
     _, said, folder = result
     (sentence,) = use_sentences(said)
     assert said["typical_depth_m"] == pytest.approx(0.0075, rel=0.01)
-    assert "= 7.5 mm" in sentence and "at 7.5 mm" in (folder / "report.html").read_text(encoding="utf-8")
+    page = (folder / "report.html").read_text(encoding="utf-8").replace("\N{NO-BREAK SPACE}", " ")
+    assert "F / z at the depth D = 7.5 mm" in sentence and "F / z at the depth D = 7.5 mm" in page
+    assert "K [N/m]: F / z at z = D" in (folder / "model.toml").read_text(encoding="utf-8")
     straight = said | {"equations": []}
-    assert "secant" not in use_sentences(straight)[0]
+    assert "F / z" not in use_sentences(straight)[0]
 
 
 def test_a_model_of_pushes_states_their_range_and_that_none_came_out(result):
