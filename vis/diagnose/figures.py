@@ -114,8 +114,8 @@ def source_of(folder: Path) -> str:
     """How the trials of a diagnosis came about: "simulated on grains", "simulated", "as recorded (CMU)" or "as given".
 
     hedgebed signs the campaigns that it makes: `made_by` in the notes of campaign.toml, which model.toml repeats. A
-    campaign without its signature is as recorded by whom its notes name in `recorded_by`, else as given, measured or
-    not; without model.toml the word is "recorded".
+    campaign without its signature is as recorded, if its notes say by whom (`recorded_by`), else as given: measured or
+    not. Without model.toml the word is "recorded".
     """
     path = folder / "model.toml"
     if not path.exists():
