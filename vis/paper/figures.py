@@ -330,7 +330,7 @@ def figure_signs(paper: PaperRun) -> Block | None:
             if number:
                 axis.axvline(len(paper.torques) * number - 0.5, color=GREY, lw=0.8)
         axis.set_xlim(-0.5, len(places) - 0.5)
-    axes[0, 0].set(ylabel="trajectory angle [degrees]", ylim=(-45.0, 68.0))
+    axes[0, 0].set(ylabel="trajectory angle [degrees]", ylim=(-45.0, 72.0))
     packed = [entry for entry in kept.get("packed", []) if entry["surface"] in surfaces]
     denser = [handle(f"{_grains_of(packed, surfaces)} at the powder's density: one bed", BED, marker="D", ls="", ms=5)]
     springs = [entry for entry in kept.get("springs", []) if entry["surface"] in surfaces]
@@ -360,7 +360,7 @@ def _only_weak(kept: Result, surface: str, rig: float) -> str:
             for key in ("one_bed", "beds", "packed")}  # fmt: skip
     if here["beds"] or here["packed"] or not here["one_bed"]:
         return ""
-    return f"{_grains_of(here['one_bed'], [surface])} only,\none bed each"
+    return f"{_grains_of(here['one_bed'], [surface]).removeprefix('grains of ')} only,\none bed each"
 
 
 def _grains_of(entries: Sequence[Result], surfaces: Sequence[str]) -> str:
