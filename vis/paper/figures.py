@@ -397,7 +397,7 @@ def _draw_signs(axis: Axes, paper: PaperRun, kept: Result, what: tuple[str, floa
 def _half(entry: Result) -> float:
     """Half of the 95 % interval [degrees]: of the mean over beds, or of an angle on the spring-damper."""
     if "angles" in entry:
-        return half_width(float(np.std(entry["angles"], ddof=1)), len(entry["angles"]))
+        return half_width(float(np.std(entry["angles"], ddof=1)), len(entry["angles"])) or 0.0
     return NORMAL * float(entry["std"] if "std" in entry else entry["half"])  # older folders have the std as half
 
 
