@@ -27,7 +27,7 @@ COLOURS = ("#0072B2", "#E69F00", "#CC79A7", "#56B4E9", "#009E73")
 _HARD = ("steel", "brick")
 _SOILS = {"sand": "sand", "jsc1a": "JSC-1A"}
 """Surfaces of grains: the soil of the paper. Legends name the materials that we compute."""
-_MARK = 2.0  # an interval below this half is no longer than its mark [degrees]
+_MARK = 2.5  # an interval below this half is no longer than its mark [degrees]
 VARIANTS = ("low", "nominal", "high", "paper")
 """Of a case: friction at the lower end of its band, its value, at the upper end; the paper's fixed step."""
 _DASHED, _DOTTED = (0, (5, 3)), (0, (1, 1.6))
@@ -335,7 +335,8 @@ def figure_signs(paper: PaperRun) -> Block | None:
     denser = [handle(f"{_grains_of(packed, surfaces)} at the powder's density: one bed", BED, marker="D", ls="", ms=5)]
     springs = [entry for entry in kept.get("springs", []) if entry["surface"] in surfaces]
     halves = [_half(entry) for entry in kept["beds"] if entry["surface"] in surfaces]
-    hidden = "".join(f" (the mark hides ± {half:.1f}°)" for half in sorted(halves)[:1] if half < _MARK)
+    small = ", ".join(f"± {half:.1f}°" for half in sorted(halves) if half < _MARK)
+    hidden = f" (marks hide {small})" if small else ""
     thin = f"by the error of K and C, ± {_half(springs[0]):.0f}° (95 %, one case)" if springs else ""
     legend_above(drawing, [
         handle(f"spring-damper of {' and '.join(surfaces)}", MODEL, marker="o", ls="", ms=6),

@@ -31,7 +31,10 @@ from vis.paper.figures import PaperRun, figure_5, figure_signs
 
 RESULTS = Path(experiments.__file__).parents[1] / "docs" / "results"
 
-LEGEND = ("grains of sand: mean of three to five beds, 95 %", "other materials, grains of sand-weak: one bed each")
+LEGEND = (
+    "grains of sand: mean of three to five beds, 95 % (marks hide ± 2.3°)",
+    "other materials, grains of sand-weak: one bed each",
+)
 
 
 @pytest.fixture(scope="module")
@@ -234,7 +237,7 @@ def test_the_picture_of_the_signs_says_where_its_grains_are_of_other_materials_o
     kept["beds"] = [{**beds[0], "angles": [1.0, 1.1, 0.9]}]
     figure_signs(PaperRun(report))
     assert [text.get_text() for text in drawn[1].axes[0].texts] == ["sand"]
-    assert drawn[1].legends[0].get_texts()[3].get_text().endswith("(the mark hides ± 0.2°)")
+    assert drawn[1].legends[0].get_texts()[3].get_text().endswith("(marks hide ± 0.2°)")
 
 
 def trials_of(*, kept=(), **angles):
