@@ -198,8 +198,8 @@ class MujocoRobot:
         ways = rises(self.model, self.data)
         if not ways:
             raise ValueError(
-                "height is given, but the robot has no free joint or upright rail to be raised by: leave it out, or "
-                'free the robot; in a URDF file a joint of type "floating" to a link "world" does so'
+                "height is given, but the robot has no free joint or upright rail to be raised by. Leave it out, or "
+                'free the robot. In a URDF file a joint of type "floating" to a link "world" does so'
             )
         for place, up in ways:
             self.data.qpos[place] += height / up

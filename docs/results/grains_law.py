@@ -11,11 +11,13 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from matplotlib.colors import to_hex
+from matplotlib.lines import Line2D
 
 from experiments.cli.main import main as hedgebed
-from vis.diagnose.figures import trials_of
+from vis.diagnose.figures import BASE, trials_of
 from vis.page.folder import Run, RunFolder, Series, read_columns, read_folder
-from vis.page.plots import styled, title_above
+from vis.page.plots import MODEL, styled, title_above
 from vis.penetrate.report import draw_amended
 
 HERE = Path(__file__).parent
@@ -65,6 +67,9 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder, styled():
         drawing = draw_amended(beside(laws(Path(folder))))
         assert drawing is not None
+        for line in drawing.findobj(Line2D):  # the base model has the colour that it has in pictures of diagnoses
+            if to_hex(line.get_color()) == MODEL.lower():
+                line.set_color(BASE)
         title_above(drawing, trials_of(READINGS))
         drawing.savefig(HERE.parent / "images" / "diagnose-grains-law.png", dpi=130)
 

@@ -38,7 +38,7 @@ def headline_of_tiles(tiles: Sequence[Tile], result: Mapping[str, Any]) -> Headl
     if not tiles:
         return None
     table, *notes = answer(tiles, result)
-    if any(tile.beside for tile in tiles) or kind_of(result) == "bed":
+    if any(tile.beside for tile in tiles) or kind_of(result) in ("bed", "platform on grains"):
         table, notes = without_unknown(table, notes)
     end = None if len(table.head) == 3 and any(row[-1] for row in table.rows) else -1
     rows = tuple(tuple(foldable(cell) for cell in row[:end]) for row in table.rows)

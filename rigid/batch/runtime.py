@@ -27,7 +27,7 @@ def ensure(*, threads: int | None = None) -> None:
         config = impl.current_cfg()
         if impl.get_runtime().default_fp != ti.f64 or config.arch not in (ti.x64, ti.arm64):
             raise RuntimeError(
-                "Taichi runs in single precision or not on the CPU in this process (for a bed, it seems): run the "
+                "Taichi runs in single precision or not on the CPU in this process (for a bed, it seems). Run the "
                 "batch in a process of its own, or the bed in float64 on the CPU"
             )
         return

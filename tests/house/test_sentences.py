@@ -1,7 +1,8 @@
-"""No sentence in the docstring of a public module, class or function has more than 25 words."""
+"""No sentence of a public docstring, or of a file with texts of reports and messages, has more than 25 words."""
 
 import ast
 import re
+import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -11,6 +12,7 @@ ROOT = Path(__file__).parents[2]
 PACKAGES = ("benchmarks", "coupling", "dem", "experiments", "rigid", "vis")
 MOST = 25
 """Words of a sentence. Numbers, symbols of one letter and signs between them are no words."""
+FILES = sorted([*(ROOT / "experiments").rglob("sentences.toml"), *(ROOT / "vis").rglob("*.toml")])
 _WORD = re.compile(r"[A-Za-z]{2,}|\b[aA]\b")
 _ENTRY = re.compile(r"\s*(?:[-*] |`{0,2}[\w, ]+`{0,2}: )")
 """Begin of an entry of a list or of the explanation of a name, which ends the sentence before it."""
@@ -59,6 +61,26 @@ def test_no_public_docstring_has_a_sentence_of_more_than_25_words(package):
         for sentence in long_sentences(docstring)
     }
     assert not found, "\n".join(sorted(found))
+
+
+def texts_of(table: object) -> Iterator[str]:
+    """Every text in a file of texts, at any depth."""
+    if isinstance(table, str):
+        yield table
+    elif isinstance(table, dict | list):
+        for part in table.values() if isinstance(table, dict) else table:
+            yield from texts_of(part)
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_no_text_of_a_report_or_a_message_has_a_sentence_of_more_than_25_words(path):
+    texts = texts_of(tomllib.loads(path.read_text(encoding="utf-8")))
+    assert [sentence for text in texts for sentence in long_sentences(text)] == []
+
+
+def test_texts_are_found_in_tables_lists_and_lists_of_tables():
+    table = tomllib.loads('a = "one"\nb = ["two", 3]\n[c]\nd = "four"\n[[e]]\nf = "five"\ng = true\n')
+    assert list(texts_of(table)) == ["one", "two", "four", "five"]
 
 
 def test_a_long_sentence_counts_in_prose_and_entries_but_not_in_examples_code_tables_and_equations():

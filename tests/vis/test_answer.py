@@ -13,6 +13,7 @@ from experiments.runs.headline import headline_of, headline_of_tiles
 from experiments.runs.registry import EXPERIMENTS
 from rigid.result import read_result
 from vis.page.answer import MOST_ROWS, answer, write_page
+from vis.page.numbers import foldable
 from vis.page.page import Page, Section, Tile, listing, text
 from vis.page.sentences import label_of
 from vis.paper.report import CASE_HEAD
@@ -203,6 +204,57 @@ def test_a_law_whose_parameters_have_no_error_says_that_it_is_not_known():
 )
 def test_a_bias_is_stated_of_the_trials_that_it_was_found_in(more, cell):
     assert rows_of(tumble_result(**more))["Trajectory angle"][3] == cell
+
+
+def tumble_on_grains(**more):
+    """The result of one bed, without spread."""
+    result = tumble_result(ground="bed", grains={}, law_spread=None, duration=1.1, **more)
+    result["trial"] = {"stiffness": {"value": 77.8}} | result["trial"]
+    result["quantities"] |= {
+        "trajectory_angle": {"value": math.radians(-18), "std": None, "unit": "rad"},
+        "sinkage_largest": {"value": 0.019, "std": None, "unit": "m"},
+        "max_speed": {"value": 0.159, "std": None, "unit": "m/s"},
+    }
+    return result
+
+
+@pytest.mark.parametrize(
+    ("more", "angle", "sinkage"),
+    [
+        (
+            {},
+            ("3 to 4° (other beds; 4 mm grains: 7°)", "+23 ± 24° (real grains)", "+4 ± 16° (spikes 153 mm apart)"),
+            ("20 % (other beds)", "−9 ± 8 mm (real grains)", "not known"),
+        ),
+        (
+            {"surface": "sand-weak"},
+            ("3 to 4° (other beds; 4 mm grains: 7°)", "not known", "not known"),
+            ("20 % (other beds)", "not known", "not known"),
+        ),
+        (
+            {"trial": tumble_result()["trial"] | {"stiffness": {"value": 82.2}}},  # `sand` of before 2026-11-26
+            ("3 to 4° (other beds; 4 mm grains: 7°)", "not known", "not known"),
+            ("20 % (other beds)", "not known", "not known"),
+        ),
+        ({"surface": "jsc1a"}, ("not known",) * 3, ("not known",) * 3),
+        ({"effects": [{"id": "ploughing"}]}, ("not known",) * 3, ("not known",) * 3),
+    ],
+)
+def test_a_tumble_on_one_bed_states_the_errors_that_limits_have_of_its_trial(more, angle, sinkage):
+    result = tumble_on_grains(**more)
+    rows = {label: tuple(map(foldable, cells)) for label, cells in rows_of(result).items()}
+    assert (rows["Trajectory angle"][1:], rows["Largest sinkage"][1:]) == (angle, sinkage)
+    assert rows["Largest speed"][1:] == ("not known",) * 3
+    assert "docs/limits.md" in answer(tumble_tiles(result), result)[1].text
+
+
+def test_the_mean_over_beds_of_a_tumble_keeps_its_own_chance_and_a_missing_number_has_none():
+    result = tumble_on_grains()
+    result["quantities"]["trajectory_angle"]["std"] = math.radians(2.0)
+    result["quantities"]["sinkage_largest"]["value"] = None
+    rows = rows_of(result)
+    assert rows["Trajectory angle"][:2] == ("−18°", "2°") and rows["Trajectory angle"][2].startswith("+23")
+    assert rows["Largest sinkage"] == ("none", "–", "–", "–")
 
 
 def test_the_terminal_of_a_tumble_has_the_rows_and_the_note_of_its_report():

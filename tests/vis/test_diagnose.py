@@ -88,6 +88,8 @@ def test_what_replicates_differ_by_stands_beside_the_gap_and_behind_what_is_left
         ('[notes]\n"made_by" = "hedgebed 0.1.0 campaign"\n', "simulated"),
         ('[notes]\n"made_by" = "the rig in hall 3, on a bed of sand"\n', "as given"),
         ('format = "hedgehog-model/1"\n', "as given"),
+        ('[notes]\nrecorded_by = "CMU"\n', "as recorded (CMU)"),
+        ('[notes]\nrecorded_by = "CMU"\nmade_by = "hedgebed 0.1.0 campaign"\n', "simulated"),
         (None, "recorded"),
     ],
 )

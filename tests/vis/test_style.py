@@ -110,14 +110,18 @@ def test_the_states_have_colours_apart_for_the_colour_blind_too_and_dark_enough_
 
 @pytest.mark.parametrize("sight", SIGHT.values(), ids=SIGHT)
 def test_a_diagnosis_shows_states_in_their_colours_and_phases_of_pushes_apart_from_both_models(sight):
-    """CIE 1976 distances: 30 between phases, 20 from the lines of both models, for the colour-blind too.
+    """CIE 1976 distances: 30 between phases, 20 from states and both models, for the colour-blind too.
 
     The line of the base model is apart from every state as well: it had the colour of slipping.
     """
     assert all(_PHASES[name] == colour for name, colour in STATES.items())
     pushed = [lab(_PHASES[name], np.array(sight)) for name in ("free", "in", "rest", "out")]
     assert min(np.linalg.norm(one - other) for one, other in combinations(pushed, 2)) > 30
-    assert min(np.linalg.norm(pushed[3] - lab(line, np.array(sight))) for line in (BASE, AMENDED)) > 20
+    apart = [
+        lab(line, np.array(sight)) for line in (BASE, AMENDED, *(STATES[name] for name in ("pivot", "slip", "hop")))
+    ]
+    assert min(np.linalg.norm(pushed[k] - other) for k in (0, 1, 3) for other in apart[:2]) > 20
+    assert min(np.linalg.norm(pushed[k] - other) for k in (0, 1) for other in apart[2:]) > 20
     base = lab(BASE, np.array(sight))
     assert min(np.linalg.norm(base - lab(one, np.array(sight))) for one in (*_PHASES.values(), AMENDED)) > 25
 

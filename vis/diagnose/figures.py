@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from rigid.series import read_series
 from vis.diagnose.held_out import worsens_held_out
-from vis.page.plots import AMENDED, DASHED, GREY, INK, MODEL, STATES, Array, handle, legend_above, sheet
+from vis.page.plots import AMENDED, DASHED, GREY, INK, MODEL, PHASES, STATES, Array, handle, legend_above, sheet
 from vis.page.report import Result
 from vis.page.sentences import Sentences
 from vis.page.states import state_runs
@@ -47,9 +47,8 @@ _QUANTITIES: dict[str, tuple[str, str]] = {
 _REPLICATES = "#e6d08f"  # by what replicates differ: darker than the page and than the band of the sensor
 BASE = "#7B3FF2"
 """The base model: not the colour of the spring-damper in other figures, which is that of the state "slip" here."""
-_PHASES = STATES | {"free": STATES["hop"], "in": STATES["pivot"], "rest": STATES["stand"], "out": "#503f00"}
-"""Of a tumble the colours that its states have everywhere. Of a push, never in one figure with those, three of them and
-a brown for `out`, which would have the colour of the base model."""
+_PHASES = STATES | PHASES
+"""Of a tumble the colours that its states have everywhere, of a push those of its phases."""
 _FACTORS = {"mm": 1e3, "degrees": 180 / math.pi}
 """What a number in SI is multiplied by to be in a unit."""
 _NARROW = 3.0
@@ -112,17 +111,19 @@ def read_channel(path: Path) -> Channel:
 
 
 def source_of(folder: Path) -> str:
-    """How the trials of a diagnosis came about: "simulated on grains", "simulated" or "as given".
+    """How the trials of a diagnosis came about: "simulated on grains", "simulated", "as recorded (CMU)" or "as given".
 
     hedgebed signs the campaigns that it makes: `made_by` in the notes of campaign.toml, which model.toml repeats. A
-    campaign without its signature is as given, measured or not; without model.toml the word is "recorded".
+    campaign without its signature is as recorded, if its notes say by whom (`recorded_by`), else as given: measured or
+    not. Without model.toml the word is "recorded".
     """
     path = folder / "model.toml"
     if not path.exists():
         return "recorded"
-    made_by = str(tomllib.loads(path.read_text(encoding="utf-8")).get("notes", {}).get("made_by", ""))
+    notes = tomllib.loads(path.read_text(encoding="utf-8")).get("notes", {})
+    made_by = str(notes.get("made_by", ""))
     if not made_by.startswith("hedgebed "):
-        return "as given"
+        return f"as recorded ({notes['recorded_by']})" if "recorded_by" in notes else "as given"
     return "simulated on grains" if " penetrate, grains" in made_by or " on a bed of " in made_by else "simulated"
 
 

@@ -19,7 +19,7 @@ MINUS, NBSP = "\N{MINUS SIGN}", "\N{NO-BREAK SPACE}"
 MOST_ROWS = 6
 _FINDINGS = 3
 _ERRORS = ("± chance", "± grain size", "± bed, softness, speed")
-_ON_ONE_LAW = ("tumble", "tumble spatial", "hop")
+_MOTIONS = ("tumble", "tumble spatial", "hop")
 _ON_GRAINS = ("spike on grains", "platform on grains", "robot on grains", "bed")
 
 
@@ -103,14 +103,15 @@ def _errors(result: Mapping[str, Any], on_grains: bool) -> tuple[Sequence[str], 
     experiment = result.get("experiment")
     if experiment == "converge":
         return (say("of_95"), *_ERRORS[1:], say("all")), ["sum"]
-    if kind_of(result) == "planar model" and experiment in _ON_ONE_LAW:
+    if kind_of(result) == "planar model" and experiment in _MOTIONS:
         return (_ERRORS[0], say("of_the_law"), say("bias")), ["one_law"]
     if experiment == "compare":
         return (say("of_compare"), *_ERRORS[1:]), []
     if experiment == "mujoco":
         return _errors_of_robot(result, on_grains)
-    else:
-        keys = ["empty_cells"] if on_grains else []
+    if kind_of(result) == "platform on grains" and experiment in _MOTIONS and "beds" not in result:
+        return _ERRORS, ["of_limits"]
+    keys = ["empty_cells"] if on_grains else []
     if experiment == "diagnose":
         return (say("of_fit"), *_ERRORS[1:]), keys
     if experiment == "ground":

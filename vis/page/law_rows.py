@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from rigid.intervals import NORMAL
-from vis.page.limits import bias_of, kind_of
+from vis.page.limits import bias_of, kind_of, known_errors
 from vis.page.numbers import quote, short, split_spread
 from vis.page.page import Tile
 from vis.page.sentences import Sentences
@@ -45,10 +45,22 @@ def answer_rows(
     """
     quantities, on_law = result["quantities"], kind_of(result) == "planar model"
     return [
-        law_row(result, name, label, note) if on_law else Tile(label, shown(quantities[name]), note)
+        law_row(result, name, label, note) if on_law else _row_on_grains(result, name, label, note, shown)
         for name, (label, note) in rows.items()
         if name in quantities
     ]
+
+
+def _row_on_grains(
+    result: Mapping[str, Any], name: str, label: str, note: str, shown: Callable[[Mapping[str, Any]], str]
+) -> Tile:
+    """The row of a number of a motion on grains, with its errors as far as docs/limits.md has them."""
+    entry = result["quantities"][name]
+    value = shown(entry)
+    if entry["value"] is None:
+        return Tile(label, value, note)
+    chance, *others = (error or say("not_known") for error in known_errors(result, name))
+    return Tile(label, value, note, errors=("" if split_spread(value)[1] else chance, *others))
 
 
 def cell_of(value: float | None, std: float | None, unit: str) -> str:

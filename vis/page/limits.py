@@ -16,12 +16,17 @@ from typing import Any
 
 from .marks import insert
 
-__all__ = ["KINDS", "Bias", "Limit", "all_limits", "bias_of", "kind_of", "limits_lines", "limits_words", "put_lines"]
+__all__ = [
+    "KINDS", "Bias", "Limit", "all_limits", "bias_of", "kind_of", "known_errors", "limits_lines", "limits_words",
+    "put_lines",
+]  # fmt: skip
 
 KINDS = (
     "spike on grains", "platform on grains", "robot on grains", "robot on a law", "bed", "planar model", "diagnosis",
 )  # fmt: skip
 """Kinds of runs that limits concern."""
+ERRORS = ("chance", "grain size", "bed")
+"""Columns of errors in the table of a run on grains, as a bias names them."""
 _MARKS = ("<!-- limits: begin -->", "<!-- limits: end -->")
 _GROUPS = {
     True: "What fails",
@@ -31,26 +36,42 @@ _GROUPS = {
 
 @dataclass(frozen=True, kw_only=True)
 class Bias:
-    """A limit's size for one number of a trial on a law, as the table of a report has it."""
+    """A limit's size for one number of a trial, as the table of a report has it."""
 
     number: str  # Of result.json
-    cell: str  # How far the law is off, and from what
-    surface: str
+    cell: str  # How far it is off, and from what; after `real` only from what
+    surface: str | tuple[str, ...]
     actuator: str
+    column: str = "bias"  # Of the table: "bias" of a trial on the spring-damper, one of `ERRORS` of one on grains
+    real: tuple[float, float] | None = None  # The number among real grains and its half interval [degrees or mm]
     torque: float | None = None  # [N m]; None: of any
     gravity_sim: float | None = None  # [m/s2]; None: of any
+    stiffness: float | None = None  # Of the surface [N/m]: `sand` of before 2026-11-26 had another; None: of any
+    duration: float | None = None  # [s]; None: of any
 
     def concerns(self, result: Mapping[str, Any], number: str) -> bool:
         """Whether it is of this `number` of this result, whose model has no further terms."""
         trial = result.get("trial") or {}
-        for name, wanted in (("torque", self.torque), ("gravity_sim", self.gravity_sim)):
+        for name in ("torque", "gravity_sim", "stiffness"):
+            wanted = getattr(self, name)
             found = (trial.get(name) or {}).get("value")
             if wanted is not None and (found is None or not math.isclose(found, wanted, rel_tol=0.01)):
                 return False
-        names = (number, result.get("surface"), result.get("actuator"), result.get("ground"))
-        return not result.get("effects") and names == (
-            self.number, self.surface, self.actuator, "spring-damper"
-        )  # fmt: skip
+        if self.duration is not None and not math.isclose(result.get("duration") or 0.0, self.duration, rel_tol=0.1):
+            return False
+        surfaces = (self.surface,) if isinstance(self.surface, str) else self.surface
+        names = (number, result.get("actuator"), result.get("ground"))
+        ground = "spring-damper" if self.column == "bias" else "bed"
+        alike = names == (self.number, self.actuator, ground) and result.get("surface") in surfaces
+        return alike and not result.get("effects")
+
+    def shown(self, entry: Mapping[str, Any]) -> str:
+        """The cell beside this number of result.json: with `real`, how far it is from that."""
+        if self.real is None:
+            return self.cell
+        factor, unit = (180 / math.pi, "°") if entry["unit"] == "rad" else (1e3, "\N{NO-BREAK SPACE}mm")
+        off = f"{factor * entry['value'] - self.real[0]:+.0f}".replace("-", "\N{MINUS SIGN}")
+        return f"{off} ± {self.real[1]:.0f}{unit} {self.cell}"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,7 +85,7 @@ class Limit:
     fails: bool = False  # Whether something measured or published is missed
     case: tuple[str, ...] = ()  # Rows of docs/validation.md that fail by it
     said: str = ""  # What reports say of it, size and direction included; "": nothing
-    bias: Bias | None = None  # Its size in the table of a report
+    bias: tuple[Bias, ...] = ()  # Its size in the table of a report
 
 
 @cache
@@ -77,7 +98,7 @@ def all_limits() -> tuple[Limit, ...]:
             "source": entry["from"],
             "runs": tuple(entry["runs"]),
             "case": tuple(entry.get("case", ())),
-            "bias": Bias(**entry["bias"]) if "bias" in entry else None,
+            "bias": tuple(Bias(**one) for one in entry.get("bias", ())),
         }
         del given["from"]
         limit = Limit(**given)
@@ -115,9 +136,18 @@ def limits_words(result: Mapping[str, Any]) -> list[str]:
 
 def bias_of(result: Mapping[str, Any], number: str) -> str:
     """The known bias of a number of a trial on a law, as a cell of a table; "" where none is known."""
+    return _known(result, number, "bias")
+
+
+def known_errors(result: Mapping[str, Any], number: str) -> tuple[str, ...]:
+    """The `ERRORS` of a number of a trial on grains as far as limits have them; "" for one that none has."""
+    return tuple(_known(result, number, column) for column in ERRORS)
+
+
+def _known(result: Mapping[str, Any], number: str, column: str) -> str:
     kind = kind_of(result)
-    known = [limit.bias for limit in all_limits() if kind in limit.runs and limit.bias is not None]
-    return next((bias.cell for bias in known if bias.concerns(result, number)), "")
+    known = (bias for limit in all_limits() if kind in limit.runs for bias in limit.bias if bias.column == column)
+    return next((bias.shown(result["quantities"][number]) for bias in known if bias.concerns(result, number)), "")
 
 
 def limits_lines(limits: Sequence[Limit]) -> list[str]:

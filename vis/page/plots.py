@@ -22,8 +22,8 @@ from matplotlib.rcsetup import cycler
 from numpy.typing import NDArray
 
 __all__ = [
-    "AMENDED", "AXES", "AXIS_LINES", "BED", "DASHED", "DOTTED", "DPI", "GREY", "INK", "MODEL", "RED", "STATES",
-    "WIDTH", "Array", "as_it_lies", "handle", "legend_above", "line_handles", "line_styles", "mean_over",
+    "AMENDED", "AXES", "AXIS_LINES", "BED", "DASHED", "DOTTED", "DPI", "GREY", "INK", "MODEL", "PHASES", "RED",
+    "STATES", "WIDTH", "Array", "as_it_lies", "handle", "legend_above", "line_handles", "line_styles", "mean_over",
     "new_figure", "new_panels", "nice_below", "shades", "sheet", "smooth_ratio", "styled", "title_above",
 ]  # fmt: skip
 
@@ -49,6 +49,8 @@ GREY = "#8a8a8a"
 STATES = {"stand": "#a4a4a4", "pivot": BED, "slip": MODEL, "hop": "#882255"}
 """The states in the order of losing hold, with their colours: apart for the colour-blind too (tests/vis/test_style.py),
 to whom Okabe and Ito's green is the grey of standing or the blue of pivoting; Tol's wine is neither."""
+PHASES = {"free": "#eeaa00", "in": "#332288", "rest": STATES["stand"], "out": "#503f00"}
+"""The phases of a push: apart from one another, and from the states of a tumble except standing, which is rest."""
 DPI = 160
 _TITLE, _TITLE_LINE, _TITLE_LETTERS = 10.5, 0.185, 11.2
 """Title of a figure: its size [points], the height of a line [inch], letters in an inch of a line."""

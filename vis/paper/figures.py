@@ -27,6 +27,7 @@ COLOURS = ("#0072B2", "#E69F00", "#CC79A7", "#56B4E9", "#009E73")
 _HARD = ("steel", "brick")
 _SOILS = {"sand": "sand", "jsc1a": "JSC-1A"}
 """Surfaces of grains: the soil of the paper. Legends name the materials that we compute."""
+_MARK = 2.5  # an interval below this half is no longer than its mark [degrees]
 VARIANTS = ("low", "nominal", "high", "paper")
 """Of a case: friction at the lower end of its band, its value, at the upper end; the paper's fixed step."""
 _DASHED, _DOTTED = (0, (5, 3)), (0, (1, 1.6))
@@ -305,7 +306,7 @@ def _draw_measures(axis: Axes, paper: PaperRun, surface: str, rig: float, key: s
 
 
 def figure_signs(paper: PaperRun) -> Block | None:
-    """Launch angles on sand and JSC-1A: spring-damper, grains, and the signs that the text states."""
+    """Trajectory angles on sand and JSC-1A: spring-damper, grains, and the signs that the text states."""
     kept = paper.result.get("kept_on_grains")
     surfaces = [name for name in _SOILS if name in paper.surfaces]
     if not kept or not surfaces:
@@ -324,26 +325,43 @@ def figure_signs(paper: PaperRun) -> Block | None:
         for number, surface in enumerate(surfaces):
             middle = (len(paper.torques) * (number + 0.5) - 0.5 + 0.5) / len(places)
             axis.text(middle, 0.98, _SOILS[surface], transform=axis.transAxes, ha="center", va="top", fontweight="bold")
+            if only := _only_weak(kept, surface, rig):
+                axis.text(middle, 0.90, only, transform=axis.transAxes, ha="center", va="top", fontsize=8)
             if number:
                 axis.axvline(len(paper.torques) * number - 0.5, color=GREY, lw=0.8)
         axis.set_xlim(-0.5, len(places) - 0.5)
-    axes[0, 0].set(ylabel="launch angle [degrees]", ylim=(-45.0, 62.0))
+    axes[0, 0].set(ylabel="trajectory angle [degrees]", ylim=(-45.0, 72.0))
     packed = [entry for entry in kept.get("packed", []) if entry["surface"] in surfaces]
     denser = [handle(f"{_grains_of(packed, surfaces)} at the powder's density: one bed", BED, marker="D", ls="", ms=5)]
     springs = [entry for entry in kept.get("springs", []) if entry["surface"] in surfaces]
+    halves = [_half(entry) for entry in kept["beds"] if entry["surface"] in surfaces]
+    small = ", ".join(f"± {half:.1f}°" for half in sorted(halves) if half < _MARK)
+    hidden = f" (marks hide {small})" if small else ""
     thin = f"by the error of K and C, ± {_half(springs[0]):.0f}° (95 %, one case)" if springs else ""
     legend_above(drawing, [
         handle(f"spring-damper of {' and '.join(surfaces)}", MODEL, marker="o", ls="", ms=6),
         handle("by both ends of its friction band", MODEL, lw=3.0, alpha=0.4),
         *([handle(thin, MODEL, lw=1.0)] if springs else []),
-        handle(f"{_grains_of(kept['beds'], surfaces)}: mean of three to five beds, 95 %", BED, marker="s", ls="", ms=6),
+        handle(f"{_grains_of(kept['beds'], surfaces)}: mean of three to five beds, 95 %{hidden}",
+               BED, marker="s", ls="", ms=6),
         handle(f"other materials, {_grains_of(kept['one_bed'], surfaces)}: one bed each", BED, marker="s", mfc="none",
                ls="", ms=6),
         *(denser if packed else []),
         Patch(color=GREY, alpha=0.22, lw=0, label="the paper: motors about +22.5°, brakes below 0"),
     ], 2)  # fmt: skip
     named = " and ".join(_SOILS[name] for name in surfaces)
-    return paper.draw("signs", drawing, about=f"Launch angles on {named}: spring-damper, grains and the paper's text")
+    return paper.draw(
+        "signs", drawing, about=f"Trajectory angles on {named}: spring-damper, grains and the paper's text"
+    )
+
+
+def _only_weak(kept: Result, surface: str, rig: float) -> str:
+    """Which grains a half of a panel shows, where it has those of other materials only."""
+    here = {key: [entry for entry in kept.get(key, []) if (entry["surface"], entry["rig"]) == (surface, rig)]
+            for key in ("one_bed", "beds", "packed")}  # fmt: skip
+    if here["beds"] or here["packed"] or not here["one_bed"]:
+        return ""
+    return f"{_grains_of(here['one_bed'], [surface]).removeprefix('grains of ')} only,\none bed each"
 
 
 def _grains_of(entries: Sequence[Result], surfaces: Sequence[str]) -> str:
@@ -372,16 +390,16 @@ def _draw_signs(axis: Axes, paper: PaperRun, kept: Result, what: tuple[str, floa
     for entry in of_this(kept["one_bed"]):
         axis.plot(place, entry["angle"], "s", color=BED, mfc="none", ms=5.5)
     for entry in of_this(kept["beds"]):
-        angles = np.array(entry["angles"])
-        half = half_width(float(angles.std(ddof=1)), len(angles))
-        axis.errorbar(place + 0.2, angles.mean(), half, fmt="s", color=BED, ms=5.5, capsize=3)
+        axis.errorbar(place + 0.2, np.mean(entry["angles"]), _half(entry), fmt="s", color=BED, ms=5.5, capsize=3)
     for entry in of_this(kept.get("packed", [])):
         axis.plot(place + 0.33, entry["angles"][0], "D", color=BED, ms=4.5)
 
 
-def _half(spring: Result) -> float:
-    """Half of the 95 % interval of an angle on the spring-damper [degrees]; older folders have the std as half."""
-    return NORMAL * float(spring["std"] if "std" in spring else spring["half"])
+def _half(entry: Result) -> float:
+    """Half of the 95 % interval [degrees]: of the mean over beds, or of an angle on the spring-damper."""
+    if "angles" in entry:
+        return half_width(float(np.std(entry["angles"], ddof=1)), len(entry["angles"])) or 0.0
+    return NORMAL * float(entry["std"] if "std" in entry else entry["half"])  # older folders have the std as half
 
 
 def figure_sweep(paper: PaperRun) -> Block | None:

@@ -346,7 +346,7 @@ def test_a_hop_that_cannot_be_is_refused_before_there_is_a_folder(tmp_path, caps
 )
 def test_a_refusal_names_another_gravity_with_which_the_hop_is_possible(tmp_path, capsys, options):
     _, error = hop(tmp_path, capsys, *options)
-    gravity = float(re.search(r"at gravity = (\S+) m/s2 it is possible", " ".join(error.split()))[1])
+    gravity = float(re.search(r"At gravity = (\S+) m/s2 it is possible", " ".join(error.split()))[1])
     own = [word for pair in zip(options[::2], options[1::2], strict=True) if pair[0] != "--gravity" for word in pair]
     check(HopSettings(**settings_of([*own, "--gravity", str(gravity)])))
 

@@ -31,7 +31,10 @@ from vis.paper.figures import PaperRun, figure_5, figure_signs
 
 RESULTS = Path(experiments.__file__).parents[1] / "docs" / "results"
 
-LEGEND = ("grains of sand: mean of three to five beds, 95 %", "other materials, grains of sand-weak: one bed each")
+LEGEND = (
+    "grains of sand: mean of three to five beds, 95 % (marks hide ± 2.3°)",
+    "other materials, grains of sand-weak: one bed each",
+)
 
 
 @pytest.fixture(scope="module")
@@ -219,6 +222,22 @@ def test_the_picture_of_the_signs_names_the_grains_of_its_data(small):
         del entry["grains"]
     figure_signs(paper)
     assert drawn[1].legends[0].get_texts()[4].get_text().startswith("other materials, grains")
+
+
+def test_the_picture_of_the_signs_says_where_its_grains_are_of_other_materials_only(small):
+    drawn = []
+    report = SimpleNamespace(
+        draw=lambda _, drawing, **about: drawn.append(drawing), folder=small, result=result_of(small)
+    )
+    kept = report.result["kept_on_grains"]
+    beds, kept["beds"] = kept["beds"], []
+    figure_signs(PaperRun(report))
+    (surface, only) = (text.get_text() for text in drawn[0].axes[0].texts)
+    assert surface == "sand" and "sand-weak only" in only
+    kept["beds"] = [{**beds[0], "angles": [1.0, 1.1, 0.9]}]
+    figure_signs(PaperRun(report))
+    assert [text.get_text() for text in drawn[1].axes[0].texts] == ["sand"]
+    assert drawn[1].legends[0].get_texts()[3].get_text().endswith("(marks hide ± 0.2°)")
 
 
 def trials_of(*, kept=(), **angles):

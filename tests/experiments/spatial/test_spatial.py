@@ -69,7 +69,7 @@ def test_what_does_not_go_together_is_refused_by_name(given, said):
         ({"surface": "steel", "ground": "bed"}, "surface = 'steel' has no grains .* use sand, .*, jsc1a"),
         (
             {"bed_size": (0.07, 0.2, 0.05)},
-            r"bed_size = 0.07 m along x is too short: .* 0.\d+ m or a shorter one is accepted",
+            r"bed_size = 0.07 m along x is too short: .* 0.\d+ m is needed",
         ),
         ({"bed_size": (0.2, 0.2, 0.02)}, r"bed_size = 0.02 m deep is too shallow: .* use"),
         ({"bed_size": (0.2, 0.2, 0.05), "grain": 0.009}, "grain = 0.009 m is larger than the spike"),

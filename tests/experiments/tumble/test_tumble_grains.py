@@ -191,11 +191,11 @@ def test_the_spikes_that_an_older_run_toml_names_on_the_spring_damper_are_no_fau
         ({"spike_length": 0.2}, None),
         (
             {"spike_length": 0.15},
-            "spike_length = 0.15 is given, and spike_diameter and spike_clear are not: spikes are 12 mm",
+            "spike_length = 0.15 is given, and spike_diameter and spike_clear are not. Spikes are 12 mm",
         ),
         (
             {"spike_length": 0.15, "spike_diameter": 0.006},
-            "spike_clear are not: spikes are 6 mm thick and extend 40",
+            "spike_clear are not. Spikes are 6 mm thick and extend 40",
         ),
         ({"spike_length": 0.15, "spike_diameter": 0.006, "spike_clear": 0.02}, None),
     ],
