@@ -310,7 +310,7 @@ def test_a_urdf_stands_where_the_spring_carries_it(tmp_path):
 
 @pytest.mark.long
 def test_the_scripts_of_the_page_run_as_they_stand(monkeypatch):
-    root = EXAMPLES.parents[1]
+    root = EXAMPLES.parents[2]
     monkeypatch.chdir(root)
     blocks = re.findall(r"```python\n(.*?)```", (root / "docs" / "mujoco.md").read_text(), flags=re.S)
     on_laws = [block for block in blocks if "Bed.prepare" not in block]  # the other: test_own_loop.py
