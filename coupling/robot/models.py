@@ -42,9 +42,10 @@ def find_model(name: str | Path) -> Path:
         return shipped
     if not path.is_file():
         examples = sorted(file.stem for file in EXAMPLES.glob("mujoco-*/*.xml"))
+        beside = alike(path) if path.suffix else ""
         raise ValueError(
-            f"model = {str(name)!r}: there is no such file{alike(path) if path.suffix else ''}; an MJCF or URDF file is "
-            f"accepted, or an example that ships: {nearest(str(name), examples)}"
+            f"model = {str(name)!r}: there is no such file{beside}; an MJCF or URDF file is accepted, or an "
+            f"example that ships: {nearest(str(name), examples)}"
         )
     return path
 

@@ -98,7 +98,7 @@ def test_an_installed_hedgebed_has_all_packages_for_its_first_answers(installed,
     found = run(str(installed[0]), "-c", "import experiments; print(experiments.__file__)", cwd=tmp_path).stdout
     assert Path(found.strip()).is_relative_to(installed[0].parents[1])
     bed = json.loads((tmp_path / "runs/bed/result.json").read_text(encoding="utf-8"))
-    assert 100 < bed["grains"] < 1000
+    assert 100 < bed["quantities"]["grain_count"]["value"] < 1000
 
 
 @pytest.mark.slow

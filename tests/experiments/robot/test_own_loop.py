@@ -87,7 +87,7 @@ def test_a_loop_of_ones_own_takes_no_grains():
         law_of_run(load_model("hopper"), ["foot"], ground="bed")
 
 
-def test_the_loop_on_grains_of_the_page_runs_as_it_is_printed_and_its_controller_works(monkeypatch):
+def test_the_loop_on_grains_of_the_page_runs_as_it_is_printed_and_its_controller_works(monkeypatch, tmp_path):
     """The bed is three layers of grains, and the run shorter: the rest is what docs/mujoco.md prints."""
     from spatial_runs import grain_bed
 
@@ -97,7 +97,7 @@ def test_the_loop_on_grains_of_the_page_runs_as_it_is_printed_and_its_controller
     (code,) = re.findall(r"### On grains in Python\n```python\n(.*?)```", page, re.DOTALL)
     made = []
     monkeypatch.setattr(Bed, "prepare", lambda *_, **options: made.append(options) or grain_bed())
-    monkeypatch.chdir(ROOT)
+    monkeypatch.chdir(tmp_path)
     code = code.replace("duration=0.4", "duration=0.06").replace("0.25 < run", "0.05 < run")
     code = code.replace("(0.1, 0.1)", "(0.048, 0.048)")
     found = {}
