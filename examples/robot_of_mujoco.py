@@ -1,13 +1,11 @@
 """Put a hopping leg of MuJoCo on a surface law, push it off, and print where it goes."""
 
 import sys
-from pathlib import Path
 
 from coupling.robot import LawFeet, MujocoRobot, RobotRun
 from experiments.robot.own_loop import law_of_run
 
 small = "--small" in sys.argv
-model = Path(__file__).parents[1] / "experiments/examples/mujoco-hopper/hopper.xml"
 
 
 def control(model, data):
@@ -15,7 +13,7 @@ def control(model, data):
     data.ctrl[0] = -60.0 if 0.25 < data.time < 0.34 else 0.0
 
 
-robot = MujocoRobot(model, feet=["foot"], controller=control)
+robot = MujocoRobot("hopper", feet=["foot"], controller=control)
 sand = law_of_run(robot.model, ["foot"], surface="sand")  # as the command
 ground = LawFeet(robot.feet, **sand.law, mu_s=sand.mu_s)
 run = RobotRun(robot, ground, duration=0.35 if small else 1.0, substeps=4)

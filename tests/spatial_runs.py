@@ -31,7 +31,7 @@ def small_bed(*_):
 
 # Robots of MuJoCo ----------------------------------------------------------------------------------------------------
 
-EXAMPLES = Path(__file__).parents[1] / "experiments" / "examples"
+EXAMPLES = Path(__file__).parents[1] / "coupling" / "robot" / "examples"
 BALL = """<mujoco model="ball"><option timestep="1e-3" integrator="implicitfast" gravity="0 0 {gravity}"/><worldbody>
 <geom name="floor" type="plane" size="1 1 .1"/>
 <body name="ball" pos="0 0 {height}"><freejoint/><geom name="foot" type="{kind}" size="{size}" mass="{mass}"/></body>

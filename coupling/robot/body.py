@@ -43,7 +43,8 @@ class MujocoRobot:
 
     Parameters
     ----------
-    model : mujoco.MjModel (a copy is used), or the path of its MJCF or URDF file.
+    model : mujoco.MjModel (a copy is used), the path of its MJCF or URDF file, or the name of an
+        example (`load_model`).
     feet : names of geoms, or of sites, or patterns of them (``spike_*``).
     keyframe : name of the keyframe where it starts; None: where the model has it.
     controller : called with model and data once per time step of the model as given; sets ``data.ctrl``. What it

@@ -5,15 +5,17 @@ from typing import Any
 
 import numpy as np
 
+from rigid.checks import alike, nearest
 from rigid.checks.unfit import UnfitSettingsError
 
 from .feet import refuse_missing
 
 __all__ = [
-    "LostRobotError", "actuators_of", "check_model", "joints_of", "keyframe_of", "load_model", "refuse_lost", "rises",
-    "switch_off_floors",
+    "LostRobotError", "actuators_of", "check_model", "find_example", "find_model", "joints_of", "keyframe_of",
+    "load_model", "refuse_lost", "rises", "switch_off_floors",
 ]  # fmt: skip
 
+EXAMPLES = Path(__file__).parent / "examples"  # NAME is in mujoco-NAME: its model, and for some a controller
 SOFTER = "use a smaller time step of the model, or softer gains"
 
 
@@ -25,11 +27,35 @@ class LostRobotError(UnfitSettingsError):
         self.remedy = remedy
 
 
-def load_model(path: str | Path) -> Any:
-    """The MuJoCo model in an MJCF or URDF file. Raises ValueError for a file that is not there or no model."""
-    mujoco, path = refuse_missing(), Path(path)
+def find_example(name: str | Path, suffix: str) -> Path | None:
+    """The one file with `suffix` of the example that ships by this name; None where none has it, or a file has."""
+    path = Path(name)
+    files = sorted(EXAMPLES.glob(f"mujoco-*/*{suffix}"))
+    own = [file for file in files if file.parent.name == f"mujoco-{path}"]
+    return own[0] if own and not path.is_file() else None
+
+
+def find_model(name: str | Path) -> Path:
+    """The file of a model: a path, or the name of an example that ships. Raises ValueError for neither."""
+    path = Path(name)
+    if shipped := find_example(name, ".xml"):
+        return shipped
     if not path.is_file():
-        raise ValueError(f"model = {str(path)!r}: there is no such file; expected an MJCF or URDF file")
+        examples = sorted(file.stem for file in EXAMPLES.glob("mujoco-*/*.xml"))
+        beside = alike(path) if path.suffix else ""
+        raise ValueError(
+            f"model = {str(name)!r}: there is no such file{beside}; an MJCF or URDF file is accepted, or an "
+            f"example that ships: {nearest(str(name), examples)}"
+        )
+    return path
+
+
+def load_model(path: str | Path) -> Any:
+    """The MuJoCo model in an MJCF or URDF file, or of an example that ships: hedgehog, hopper or wheel.
+
+    Raises ValueError for a file that is not there or no model.
+    """
+    mujoco, path = refuse_missing(), find_model(path)
     try:
         return mujoco.MjModel.from_xml_path(str(path))
     except ValueError as error:

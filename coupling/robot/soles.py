@@ -106,7 +106,7 @@ def law_under_feet(
     >>> import mujoco
     >>> from coupling.robot import FootForces, LawFeet, find_feet, foot_matrices, law_under_feet, load_model
     >>> from rigid.ground_file import read_ground
-    >>> model = load_model("experiments/examples/mujoco-hopper/hopper.xml")
+    >>> model = load_model("hopper")
     >>> data = mujoco.MjData(model)
     >>> mujoco.mj_forward(model, data)
     >>> feet = find_feet(model, data, ["foot"])

@@ -1,8 +1,7 @@
 """Hooks of MkDocs: the generated pages, and links that leave `docs/`.
 
 - One page for each command of ``hedgebed``, made from the parser, under reference/commands/.
-- One page for each of `dem`, `rigid` and `coupling` with its public names, made from the docstrings, under
-  reference/python/.
+- One page for each package in PACKAGES with its public names, made from the docstrings, under reference/python/.
 - A page links to files and folders of the repository that are not under docs/, as it does on a code host. Such a file
   is copied to repository/ of the site, and a folder gets a page that lists its files.
 """
@@ -20,7 +19,8 @@ from mkdocs.structure.files import File, Files
 from mkdocs.structure.pages import Page
 
 ROOT = Path(__file__).resolve().parents[2]
-PACKAGES = ("dem", "rigid", "coupling")
+PACKAGES = ("dem", "rigid", "coupling", "coupling.robot", "experiments.robot.own_loop", "vis")
+"""What scripts import: packages, and a module."""
 OPTIONS_OF = {"dem": {
     "Options of Bed.prepare": "dem.prepare.prepare.prepare_bed",
     "Options of Bed.prepare_as": "dem.prepare.prepare.prepare_as",

@@ -146,7 +146,9 @@ def _share(bed: _Bed, to: Annotated[Path, Parameter(help="The file to write; mus
 
 
 def _foot(
-    table: Annotated[Path, Parameter(help="rft.json of a run of bed test plates.")],
+    table: Annotated[
+        Path, Parameter(help="rft.json of a run of bed test plates; sand: the table that ships, of the material sand.")
+    ],
     shape: Annotated[str, Parameter(help="ball, cone, cylinder, or a file of a closed surface (STL, OBJ).")],
     /,
     *,
@@ -173,12 +175,13 @@ def _foot(
     from experiments.bed.standing import standing_depth
     from experiments.bed.test_settings import SHAPES
     from rigid.digests import check_as_written
-    from rigid.ground.rft_table import read_rft
+    from rigid.ground.rft_table import find_rft, read_rft
     from rigid.intervals import student
 
     with refusing():
-        check_as_written(table)
-        found = read_rft(table)
+        file = find_rft(table)
+        check_as_written(file)
+        found = read_rft(file)
         if (depth is None) == (load is None):
             raise ValueError("give either --depth (the force is predicted) or --load (the depth is predicted)")
         if load is not None and gamma != 90:

@@ -45,6 +45,8 @@ def view(
             raise ValueError(f"frames = {frames}; a page shows at least 1")
         folder = RunFolder.open(run)
         check_digests(run)
+        if not any((run / name).is_file() for name in ("status.json", "cost.json")):
+            say(f"warning: {run / 'status.json'} is missing: whether the run has ended is not known")
         page = run / "view.html" if out is None else out
         if page.suffix != ".html" or not page.parent.is_dir():
             raise ValueError(f"out = {str(out)!r}; it must name a file that ends in .html, in a folder that exists")

@@ -14,6 +14,7 @@ import math
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -151,6 +152,8 @@ def read_map(material: str) -> GroundMap | CohesiveMap:
     tables = _tables()
     if material not in tables:
         why = say("no_map_of_jsc", proposed=_to_calibrate(material)) if material.startswith(("jsc", "JSC")) else ""
+        if material not in MATERIALS and (near := get_close_matches(material.lower(), tables, n=1)):
+            why = f"; did you mean {near[0]!r}?"
         raise ValueError(say("no_map", material=material, known=" and ".join(tables), why=why))
     table = tables[material]
     ranges = {key: (low, high) for key, (low, high) in table["range"].items()}

@@ -14,11 +14,13 @@ import numpy as np
 
 from coupling.robot import LawFeet, LostRobotError, MujocoRobot, load_model
 from coupling.robot.feet import Part, refuse_missing
+from coupling.robot.models import find_example
 from coupling.robot.soles import FeetLaw, compared_speeds, plan_area, sole_of
 from experiments.platform.ground_file import fitted_ground
 from experiments.platform.settled import Number, refuse_other_grains
 from experiments.platform.surfaces import Surface, find_surface, surface_of_grains
 from experiments.runs.given import keep_given, kept_copy
+from rigid.checks import alike
 from rigid.ground.laws import find_law
 from rigid.ground_file import GroundFile
 from rigid.platform.rig import STANDARD_GRAVITY
@@ -40,15 +42,13 @@ from .laws import (
 from .settings import RobotSettings
 
 __all__ = [
-    "CONTROLLER", "LAW_STEP", "MODEL", "RobotPlan", "find_model", "keep_files", "plan_robot", "try_controller",
-    "width_of",
+    "CONTROLLER", "LAW_STEP", "MODEL", "RobotPlan", "keep_files", "plan_robot", "try_controller", "width_of",
 ]  # fmt: skip
 
 LAW_STEP = 4e-5  # Of a surface law [s], ten of which make an exchange by default
 DEFAULT_SURFACE = "sand"
 OF_LAW = ("stiffness", "damping", "mu_s", "mu_d")
 """Numbers of a surface law that grains do not have: there they are those of the forecast of the bed's size."""
-EXAMPLES = Path(__file__).parents[1] / "examples"
 MODEL, CONTROLLER = "model.mjb", "controller.py"  # Copies in the run folder
 
 Controller = Callable[[Any, Any], None]
@@ -129,17 +129,6 @@ class RobotPlan:
         return [*chosen, *told, *self.notes, *(f"warning: {warning}" for warning in self.warnings)]
 
 
-def find_model(name: str) -> Path:
-    """The file of a model: a path, or the name of an example that ships. Raises ValueError for neither."""
-    path = Path(name)
-    shipped = {file.stem: file for file in sorted(EXAMPLES.glob("mujoco-*/*.xml"))}
-    if not path.suffix and not path.exists() and name in shipped:
-        return shipped[name]
-    if not path.is_file():
-        raise ValueError(say("no_model", name=name, shipped=", ".join(shipped)))
-    return path
-
-
 def keep_files(settings: RobotSettings, folder: Path) -> None:
     """Copy the compiled model and the controller into the run folder, once, so that it goes on with the same.
 
@@ -149,10 +138,10 @@ def keep_files(settings: RobotSettings, folder: Path) -> None:
     if kept_copy(folder, MODEL) is None:
         with tempfile.TemporaryDirectory() as scratch:
             compiled = Path(scratch) / MODEL
-            mujoco.mj_saveModel(load_model(find_model(settings.model)), str(compiled), None)
+            mujoco.mj_saveModel(load_model(settings.model), str(compiled), None)
             keep_given(folder, MODEL, compiled.read_bytes())
     if settings.controller is not None and kept_copy(folder, CONTROLLER) is None:
-        keep_given(folder, CONTROLLER, Path(settings.controller.rpartition(":")[0]).read_bytes())
+        keep_given(folder, CONTROLLER, _controller_file(settings.controller)[0].read_bytes())
 
 
 def plan_robot(settings: RobotSettings, *, folder: Path | None = None, model: Any = None) -> RobotPlan:
@@ -167,7 +156,7 @@ def plan_robot(settings: RobotSettings, *, folder: Path | None = None, model: An
     elif folder is not None:
         model = mujoco.MjModel.from_binary_path(str(folder / MODEL))
     else:
-        model = load_model(find_model(settings.model))
+        model = load_model(settings.model)
     numbers: dict[str, Number] = {}
     if settings.gravity is not None:
         model.opt.gravity[:] = (0.0, 0.0, -settings.gravity)
@@ -269,19 +258,25 @@ def width_of(part: Part, matrix: Any) -> float:
     return float(np.ptp(part.vertices @ matrix.T, axis=0)[:2].min())
 
 
+def _controller_file(controller: str) -> tuple[Path, str]:
+    """The file, which an example that ships has by its name too, and the function in FILE:FUNCTION."""
+    file, _, name = controller.rpartition(":")
+    return (find_example(file, ".py") if file else None) or Path(file), name
+
+
 def _controller(settings: RobotSettings, folder: Path | None) -> Controller | None:
     """The function that controls the robot. Raises ValueError for a file or function that there is not."""
     if settings.controller is None:
         return None
-    file, _, name = settings.controller.rpartition(":")
-    path = Path(file) if folder is None else folder / CONTROLLER
-    if not file or not path.is_file():
-        named = file.endswith(".py")
-        raise ValueError(say("no_such_controller" if named else "no_controller", s=settings, file=file))
+    file, name = _controller_file(settings.controller)
+    path = file if folder is None else folder / CONTROLLER
+    if not path.is_file():
+        key = "no_such_controller" if file.suffix == ".py" else "no_controller"
+        raise ValueError(say(key, s=settings, file=file, near=alike(file)))
     spec = importlib.util.spec_from_file_location("hedgebed_controller", path)
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
-    module.__file__ = str(Path(file).absolute())  # of the original: what lies beside it is not copied
+    module.__file__ = str(file.absolute())  # of the original: what lies beside it is not copied
     try:
         spec.loader.exec_module(module)
     except Exception as error:

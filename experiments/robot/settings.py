@@ -41,8 +41,9 @@ class RobotSettings(GrainsSettings):
     height: NotNegative | None = None
     """Height of the lowest foot over the surface at the start [m]; as the model has it if not given."""
     controller: str | None = None
-    """Python file and function that control the robot, as my_robot.py:control; it is called as control(model, data) at
-    every time step of the model and sets data.ctrl. The controls of the start if not given."""
+    """Python file and function that control the robot, as my_robot.py:control, or of an example that ships, as
+    hopper:control. It is called as control(model, data) at every time step of the model and sets data.ctrl. The
+    controls of the start if not given."""
     gravity: NotNegative | None = Field(None, description="Gravity, downwards [m/s2]; the model's if not given.")
     duration: Positive = Field(2.0, le=3600, description="Simulated time [s].")
 

@@ -26,6 +26,10 @@ PRINTING = ("bed foot", "bed list", "bed show")
 """Commands that print what they found and keep nothing."""
 
 
+_SET_BY = {("bed make", "--packing"): "A stage sets the packing fraction: --stages rain level packing:0.58"}
+"""Options that a command lacks -> what sets the same there."""
+
+
 class RefusedError(ValueError):
     """Bad input, found before any work."""
 
@@ -54,6 +58,9 @@ def fault_words(error: Exception) -> str:
     if isinstance(error, UnusedCliTokensError):
         return f"{' '.join(error.unused_tokens or [])} belongs to no option and to no argument; --help lists them"
     if isinstance(error, UnknownOptionError):
+        typed = (error.token.keyword or error.token.value) if error.token else ""
+        if told := _SET_BY.get((" ".join(error.command_chain or ()), typed.partition("=")[0])):
+            return f"Unknown option: {typed}. {told}"
         text = re.sub(r" Did you mean (--\S+?)\?", lambda found: found[0] if _like(error, found[1]) else "", text)
     if isinstance(error, UnknownOptionError) and "Did you mean" not in text:
         command = " ".join(error.command_chain or ())

@@ -13,6 +13,7 @@ import tempfile
 import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from difflib import get_close_matches
 from pathlib import Path
 
 import numpy as np
@@ -184,7 +185,10 @@ def cases(names: Sequence[str] = ()) -> list[Case]:
     found = [Case(path.stem, path, settings_from(TumbleSettings, [read_case(path)])) for path in paths]
     for name in names:
         if not any(case.name.startswith(name) for case in found):
-            raise ValueError(f"there is no case {name!r}: `hedgebed experiments list` names those there are")
+            begins = {"-".join(words[:n]) for case in found if (words := case.name.split("-")) for n in range(1, 9)}
+            near = get_close_matches(name, sorted(begins), n=1)
+            meant = f"did you mean {near[0]!r}? " if near else ""
+            raise ValueError(f"there is no case {name!r}: {meant}`hedgebed experiments list` names those there are")
     return [case for case in found if not names or any(case.name.startswith(name) for name in names)]
 
 

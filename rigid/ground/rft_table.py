@@ -22,17 +22,20 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from rigid.checks import why_unread
+from rigid.checks import nearest, why_unread
 
 from .rft import tractions
 
-__all__ = ["RFT_FORMAT", "Pieces", "RftTable", "box_pieces", "mesh_pieces", "read_rft", "round_pieces"]
+__all__ = [
+    "RFT_FORMAT", "Pieces", "RftTable", "box_pieces", "find_rft", "mesh_pieces", "read_rft", "round_pieces",
+]  # fmt: skip
 
 RFT_FORMAT = "hedgebed-rft/1"
 Array = NDArray[np.float64]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Factors = tuple[Finite, Finite, Finite, Finite]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+TABLES = Path(__file__).parent / "tables"  # Those that ship; sand.json is that of docs/results/bed-test-plates
 MOST = 10.0  # times what was measured, in depth and width: beyond it no force is stated
 
 
@@ -221,9 +224,22 @@ def law_tractions(factors: ArrayLike, surface_friction: float, normals: ArrayLik
     return np.asarray((1.0 + downward * facing)[:, None] * bare)
 
 
+def find_rft(name: str | Path) -> Path:
+    """The file of a table: a path, or `sand`, the table that ships. Raises ValueError for another word."""
+    path, shipped = Path(name), {file.stem: file for file in sorted(TABLES.glob("*.json"))}
+    if path.exists() or path.suffix or path.parent != Path():
+        return path
+    if path.name not in shipped:
+        raise ValueError(
+            f"table = {str(name)!r}: there is no such file; rft.json of `hedgebed bed test plates` is accepted, or a "
+            f"table that ships: {nearest(path.name, shipped)}"
+        )
+    return shipped[path.name]
+
+
 def read_rft(path: str | Path) -> RftTable:
-    """The table at `path`. Raises ValueError naming the file and what is wrong with it."""
-    path = Path(path)
+    """The table at `path`, or the one that ships by this name. Raises ValueError, naming the file and its fault."""
+    path = find_rft(path)
     try:
         return RftTable(**json.loads(path.read_text(encoding="utf-8")))
     except OSError as error:

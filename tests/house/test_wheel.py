@@ -1,6 +1,7 @@
 """What a user of pip gets: the wheel, made from the sdist, works without the checkout."""
 
 import os
+import re
 import subprocess
 import sys
 import tarfile
@@ -34,6 +35,7 @@ BASE = (
     "view runs/tumble --no-open",
     "experiments list",
     "effects",
+    "bed foot sand cylinder --size 16mm --load 0.5N",
 )
 
 
@@ -87,12 +89,32 @@ def test_the_commands_work_from_the_wheel_in_another_folder(site, tmp_path):
     assert "stiffness" in out
 
 
-def test_a_robot_that_ships_stands_on_a_law_from_the_wheel(site, tmp_path):
+def printed(page, language, *words):
+    """The blocks of a page in this language that have all these words."""
+    text = (ROOT / "docs" / page).read_text(encoding="utf-8")
+    blocks = re.findall(r"^```(\w*)\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
+    return [block for kind, block in blocks if kind == language and all(word in block for word in words)]
+
+
+def test_commands_and_scripts_of_the_pages_on_robots_and_feet_run_from_the_wheel(site, tmp_path):
+    """As printed, but those on a law of 0.05 s and without pictures; on grains other tests run them."""
     for name in ("mujoco", "trimesh"):
         pytest.importorskip(name, reason=f"{name} is not installed: pip install 'hedgebed[mujoco]'")
-    command = "mujoco hopper --feet foot --duration 0.05 --frame-count 0 --out runs/robot"
-    run(sys.executable, "-c", COMMANDS, str(site), command, cwd=tmp_path, PYTHONPATH=str(site))
-    assert (tmp_path / "runs" / "robot" / "result.json").is_file()
+    (robot,) = printed("tutorials/own-robot.md", "xml")
+    (tmp_path / "robot.xml").write_text(robot, encoding="utf-8")
+    commands = [
+        block.replace("\\\n", " ").strip().removeprefix("hedgebed ")
+        for page in ("mujoco.md", "tutorials/own-robot.md")
+        for block in printed(page, "", "--surface sand", "--duration")
+        if "--ground bed" not in block and ("hopper" in block or "--out" in block)
+    ]
+    assert len(commands) == 2 and "--controller hopper:control" in commands[0]
+    commands = [re.sub("--duration [0-9.]+", "--duration 0.05 --frame-count 0", command) for command in commands]
+    commands += [block.strip().removeprefix("hedgebed ") for block in printed("tutorials/own-foot.md", "", "bed foot")]
+    run(sys.executable, "-c", COMMANDS, str(site), *commands, cwd=tmp_path, PYTHONPATH=str(site))
+    assert (tmp_path / "runs/robot-law/result.json").is_file()
+    for script in printed("mujoco.md", "python", "law_of_run"):
+        run(sys.executable, "-c", script, cwd=tmp_path, PYTHONPATH=str(site))
 
 
 def test_an_fmu_is_written_from_the_wheel_and_another_importer_finds_no_fault_in_it(site, tmp_path):

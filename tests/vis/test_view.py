@@ -198,6 +198,13 @@ def test_the_command_writes_the_page_and_refuses_what_it_cannot_show(make_run, t
     (empty / "run.toml").write_text((run / "run.toml").read_text())
     assert main(["view", str(empty), "--no-open", "--quiet"]) == BAD_INPUT
     assert str(empty) in capsys.readouterr().err
+    (run / "status.json").unlink(missing_ok=True)
+    assert main(["view", str(run), "--no-open", "--quiet"]) == DONE
+    assert str(run / "status.json") in capsys.readouterr().err
+    result = run / "result.json"
+    result.write_bytes(result.read_bytes()[:300])
+    assert main(["view", str(run), "--no-open", "--quiet"]) == BAD_INPUT
+    assert str(result) in capsys.readouterr().err
 
 
 def test_a_notebook_shows_a_run_or_a_bed_in_a_frame_of_its_own(make_run, tmp_path):

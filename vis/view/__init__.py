@@ -1,4 +1,4 @@
 """Pages on which a run can be turned, zoomed and moved through time; small ones inside reports.
 
-Imports `vis.film`, `vis.page`, `vis.pictures`.
+Imports `rigid`, `vis.film`, `vis.page`, `vis.pictures`.
 """

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from rigid.result import read_result
 from vis.page.folder import read_folder
 from vis.page.numbers import with_squares
 from vis.page.page import Block, scene_block, text, write_template
@@ -46,6 +47,8 @@ def write_view(
     frame alone is larger than `size`.
     """
     home = Path(folder)
+    if (home / "result.json").is_file():
+        read_result(home / "result.json")  # Raises for a damaged one
     sources = sources_of(home)
     if not sources:
         raise ValueError(_nothing(home))

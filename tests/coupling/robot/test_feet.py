@@ -224,7 +224,7 @@ def test_the_picture_of_a_geom_is_as_large_as_the_geom():
 
 def test_the_parts_of_the_hopper_join_wherever_its_knee_is_by_geoms_without_mass_and_contact():
     """Seen along y: heights of trunk, sleeve, shaft, ankle and foot overlap from the lower to the upper stop."""
-    model = load_model("experiments/examples/mujoco-hopper/hopper.xml")
+    model = load_model("hopper")
     data = mujoco.MjData(model)
     assert model.body_mass[1:].tolist() == [1.5, 0.22]
     for name in ("sleeve", "ankle"):

@@ -98,7 +98,7 @@ def test_its_wrench_on_a_foot_askew_is_the_sum_over_all_points_of_the_foot(law, 
 
 
 def test_a_law_of_a_file_has_the_area_of_the_foot_over_that_of_its_tip():
-    sand, model = read_ground(EXAMPLES.parents[1] / "docs" / "results" / "calibrate-sand-1mm" / "ground.toml"), ball()
+    sand, model = read_ground(EXAMPLES.parents[2] / "docs" / "results" / "calibrate-sand-1mm" / "ground.toml"), ball()
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     feet = find_feet(model, data, ["foot"])

@@ -13,7 +13,7 @@ from experiments.bed.plates_fit import fit_of, measured_force, predicted_force
 from experiments.bed.test_settings import BedPlatesSettings
 from experiments.cli.main import BAD_INPUT, DONE, main
 from rigid.ground.rft import tractions
-from rigid.ground.rft_table import RftTable, read_rft
+from rigid.ground.rft_table import RftTable, find_rft, read_rft
 
 KEPT = Path(__file__).parents[3] / "docs" / "results" / "bed-test-plates"
 SMALL = [
@@ -147,6 +147,11 @@ def test_the_force_on_a_foot_of_one_s_own_is_printed_and_bad_input_is_refused_by
         assert main(["bed", "foot", str(path), *wrong]) == BAD_INPUT
         assert named in capsys.readouterr().err
     assert main(["bed", "foot", str(tmp_path / "none.json"), "cone", "--depth", "0.01"]) == BAD_INPUT
+
+
+def test_the_table_that_ships_is_the_kept_one():
+    assert find_rft("sand").read_bytes() == (KEPT / "rft.json").read_bytes()
+    assert read_rft("sand").material == "sand"
 
 
 def test_forces_that_cancel_by_symmetry_are_printed_as_zero_and_others_with_95_per_cent(capsys):

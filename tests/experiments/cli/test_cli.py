@@ -215,6 +215,22 @@ def test_an_option_that_a_command_has_not_is_answered_with_its_help_where_none_i
     assert "mean --platform?" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("typed", "meant"),
+    [
+        (["ground", "--material", "sands"], "did you mean 'sand'?"),
+        (["experiments", "run", "grains1-snd"], "did you mean 'grains1-sand'?"),
+        (["bed", "foot", "sands", "cylinder", "--load", "0.5N"], "did you mean 'sand'?"),
+        (["bed", "make", "--packing", "0.6"], "--stages rain level packing:0.58"),
+        (["bed", "make", "--packing=0.6"], "--stages rain level packing:0.58"),
+    ],
+)
+def test_a_misspelt_name_is_answered_with_the_one_that_ships(typed, meant, capsys, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    assert main(typed) == 2
+    assert meant in capsys.readouterr().err
+
+
 def test_no_help_shows_an_empty_default(capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "160")
     for command in (["sweep"], ["effects"], ["experiments", "list"]):

@@ -202,7 +202,7 @@ def test_a_foot_larger_than_the_spike_has_the_k_of_the_map_beside_that_by_simila
 
 def test_a_foot_that_loses_contact_in_its_crater_does_not_fly():
     """Of the times of 5 ms and more without contact, those do not count in which the foot stays below the surface."""
-    push = str(Path(__file__).parents[3] / "experiments/examples/mujoco-hopper/hop.py") + ":control"
+    push = str(Path(__file__).parents[3] / "coupling/robot/examples/mujoco-hopper/hop.py") + ":control"
     settings = RobotSettings(**HOPPER, surface="sand", ground="rft", duration=1.0, controller=push)
     run = RobotFollowed(settings, plan_robot(settings)).run_on_law()
     free = run.run()["touching"] == 0

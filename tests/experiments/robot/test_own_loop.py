@@ -10,7 +10,7 @@ from coupling.robot import FootForces, find_feet, load_model
 from coupling.robot.models import switch_off_floors
 from experiments.robot.on_grains import RobotFollowed
 from experiments.robot.own_loop import law_of_run
-from experiments.robot.plan import find_model, plan_robot
+from experiments.robot.plan import plan_robot
 from experiments.robot.settings import RobotSettings
 
 mujoco = pytest.importorskip("mujoco", reason="mujoco is not installed: pip install 'hedgebed[mujoco]'")
@@ -25,7 +25,7 @@ GIVEN = {
 
 def in_own_loop(step, options):
     """Height of the leg's joint [m] over time in a loop of MuJoCo that starts as the run does."""
-    model = load_model(find_model("hopper"))
+    model = load_model("hopper")
     model.opt.gravity[2], model.opt.timestep = -GRAVITY, step
     switch_off_floors(model)
     data = mujoco.MjData(model)
@@ -84,10 +84,10 @@ def test_the_spring_of_katsuragi_and_durian_is_as_gravity_and_its_drag_is_not():
 
 def test_a_loop_of_ones_own_takes_no_grains():
     with pytest.raises(ValueError, match="made of grains"):
-        law_of_run(load_model(find_model("hopper")), ["foot"], ground="bed")
+        law_of_run(load_model("hopper"), ["foot"], ground="bed")
 
 
-def test_the_loop_on_grains_of_the_page_runs_as_it_is_printed_and_its_controller_works(monkeypatch):
+def test_the_loop_on_grains_of_the_page_runs_as_it_is_printed_and_its_controller_works(monkeypatch, tmp_path):
     """The bed is three layers of grains, and the run shorter: the rest is what docs/mujoco.md prints."""
     from spatial_runs import grain_bed
 
@@ -97,7 +97,7 @@ def test_the_loop_on_grains_of_the_page_runs_as_it_is_printed_and_its_controller
     (code,) = re.findall(r"### On grains in Python\n```python\n(.*?)```", page, re.DOTALL)
     made = []
     monkeypatch.setattr(Bed, "prepare", lambda *_, **options: made.append(options) or grain_bed())
-    monkeypatch.chdir(ROOT)
+    monkeypatch.chdir(tmp_path)
     code = code.replace("duration=0.4", "duration=0.06").replace("0.25 < run", "0.05 < run")
     code = code.replace("(0.1, 0.1)", "(0.048, 0.048)")
     found = {}
@@ -109,4 +109,4 @@ def test_the_loop_on_grains_of_the_page_runs_as_it_is_printed_and_its_controller
     with pytest.raises(ValueError, match="robot has"):
         run.foot("toe")
     with pytest.raises(ValueError, match="grains in Python"):
-        law_of_run(load_model(find_model("hopper")), ["foot"], ground="bed")
+        law_of_run(load_model("hopper"), ["foot"], ground="bed")

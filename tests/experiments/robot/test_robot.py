@@ -66,7 +66,10 @@ def test_what_does_not_go_together_is_refused_by_name(given, said):
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        ({"model": "hoper"}, "model = 'hoper': there is no such file.* hedgehog, hopper, wheel"),
+        ({"model": "hoper"}, "model = 'hoper': there is no such file.* did you mean 'hopper'"),
+        ({"model": "mine"}, "model = 'mine': there is no such file.* hedgehog, hopper, wheel"),
+        ({"controller": "wheel:control"}, "controller = 'wheel:control': .* hopper:control or hedgehog:control"),
+        ({"controller": "hopper:go"}, r"no function 'go'; it has control"),
         ({"feet": ("fot",)}, r"no geom or site 'fot' .did you mean 'foot'"),
         ({"keyframe": "up"}, "keyframe = 'up': the model has no keyframes"),
         ({"controller": "nothing.py:control"}, "controller = 'nothing.py:control'.*nothing.py"),
@@ -540,7 +543,7 @@ def test_a_robot_without_frames_has_its_curves_alone(tmp_path, monkeypatch):
 
 
 def test_a_law_in_a_file_is_that_of_its_tip_times_the_area_of_the_foot():
-    file = EXAMPLES.parents[1] / "docs" / "results" / "calibrate-sand-1mm" / "ground.toml"
+    file = EXAMPLES.parents[2] / "docs" / "results" / "calibrate-sand-1mm" / "ground.toml"
     plan = plan_robot(RobotSettings(**HOPPER, ground=str(file)))
     fitted = plan.fitted
     assert plan.scales["foot"] == pytest.approx((0.06 / fitted.foot.diameter) ** 2, rel=0.01)
