@@ -237,7 +237,7 @@ def test_the_picture_of_the_signs_says_where_its_grains_are_of_other_materials_o
     kept["beds"] = [{**beds[0], "angles": [1.0, 1.1, 0.9]}]
     figure_signs(PaperRun(report))
     assert [text.get_text() for text in drawn[1].axes[0].texts] == ["sand"]
-    assert drawn[1].legends[0].get_texts()[3].get_text().endswith("(marks hide ± 0.2°)")
+    assert drawn[1].legends[0].get_texts()[3].get_text().endswith("hide ± 0.2°)")
 
 
 def trials_of(*, kept=(), **angles):

