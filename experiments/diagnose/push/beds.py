@@ -23,8 +23,7 @@ def scatter_parameters(
 ) -> dict[str, tuple[Parameter, ...]]:
     """What may differ between replicates beyond the sensors: kind -> one nuisance a trial, mostly not fitted.
 
-    Of all trials a factor on K and C, one on C alone, and one on the stiffness of the way back. Of pushes also the zeros
-    of depth and force.
+    Of all trials a factor on K and C, one on C alone, and one on the stiffness of the way back. Of pushes also zeros.
     """
     ids, pushes = ([t.info.id for t in trials if t.driven or not driven] for driven in (False, True))
     found = {
