@@ -118,7 +118,7 @@ def test_every_form_has_an_equation_in_the_names_of_its_parameters():
 def test_model_toml_has_the_equation_above_each_effect_and_reads_as_before():
     text = 'format = "x"\n\n[[effect]]\nid = "a"\n\n[[effect]]\nid = "mine"\n'
     shaft = FORMS["shaft-friction:constant"]
-    mine = SimpleNamespace(id="mine:own", effect="mine", name="own")
+    mine = SimpleNamespace(id="mine:own", effect="mine", name="own", stiffness="")
     rows = equations_of("penetration", [shaft, mine], lambda form: {"shaft": "N"})
     commented = with_comments(text, rows, "penetration")
     assert "# shaft-friction (constant): + shaft * sign(v); shaft [N]\n[[effect]]" in commented

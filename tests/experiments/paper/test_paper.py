@@ -209,7 +209,7 @@ def test_the_picture_of_the_signs_names_the_grains_of_its_data(small):
     (figure,) = drawn
     words = [text.get_text() for text in figure.legends[0].get_texts()]
     assert words[0] == "spring-damper of sand"
-    assert words[3:5] == list(LEGEND)
+    assert [text.replace("\n", " ") for text in words[3:5]] == list(LEGEND)
     assert "friction" in words[1] and "± 18°" in words[2]
     assert [text.get_text() for text in figure.axes[0].texts] == ["sand"]
     law, *bars_and_grains = (to_hex(entry.get_color()) for entry in figure.legends[0].get_lines())
