@@ -224,7 +224,7 @@ def tumble_on_grains(**more):
         (
             {},
             ("3 to 4° (other beds; 4 mm grains: 7°)", "+21 ± 17° (real grains)", "+4 ± 16° (spikes 153 mm apart)"),
-            ("20 % (other beds)", "−9 ± 8 mm (real grains)", "not known"),
+            ("20 % (other beds)", "−9 ± 6 mm (real grains)", "not known"),
         ),
         (
             {"surface": "sand-weak"},
