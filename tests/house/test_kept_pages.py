@@ -1,6 +1,7 @@
-"""What pages say of a motor in sand is what its kept runs give (docs/results/tumble-sand)."""
+"""What pages say of a motor in sand and of the converged spike is what their kept runs give."""
 
 import importlib.util
+import json
 import re
 from pathlib import Path
 
@@ -8,7 +9,7 @@ import pytest
 
 from experiments.converge.statistics import Size, extrapolate, interval_of
 
-ROOT = Path(__file__).parents[3]
+ROOT = Path(__file__).parents[2]
 FILE = ROOT / "docs" / "results" / "tumble-sand" / "tables.py"
 GRAINS = (4.0, 3.0, 2.4, 1.6)  # mm, the columns of the table
 ROWS = {
@@ -59,3 +60,19 @@ def test_limits_and_readme_state_the_angle_among_real_grains_of_the_kept_runs(va
         round(-five.mean), round(five.half), pytest.approx(-three.mean, abs=0.051), pytest.approx(three.half, abs=0.051)
     ]  # fmt: skip
     assert f"to 0.2 mm {-angle:.0f} ± {half:.0f}" in readme
+
+
+@pytest.mark.parametrize(
+    ("label", "name", "factor"),
+    [("K [N/m]", "stiffness", 1.0), ("C [N s/m]", "damping", 1.0), ("sinkage", "sinkage", 1e3), ("work", "work", 1e3)],
+)
+def test_the_errors_of_the_converged_spike_on_its_page_are_those_of_its_kept_result(label, name, factor):
+    kept = json.loads((ROOT / "docs/results/converge-flagship/result.json").read_text(encoding="utf-8"))
+    found = kept["quantities"][name]
+    errors = [found[key] for key in ("chance", "grain_size", "rest")]
+    page = (ROOT / "docs" / "converge.md").read_text(encoding="utf-8")
+    table = page.split("| among real grains", 1)[1].splitlines()
+    cells = next(line for line in table if line.startswith(f"| {label}")).split("|")[2:-1]
+    for shown, number in zip(cells, (found["value"], *errors, sum(errors)), strict=True):
+        digits = len(shown.strip().partition(".")[2])
+        assert float(shown) == pytest.approx(factor * number, abs=0.51 * 10.0**-digits)
