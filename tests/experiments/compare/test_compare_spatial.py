@@ -102,7 +102,7 @@ def test_grains_and_spring_damper_stand_side_by_side_in_curves_and_flat_pictures
     out = tmp_path / "both"
     result = compared(runs, out, "bed", "law")
     assert {"sand", "spring-damper"} <= {*result["title"].split()} and result["kind"] == "tumble spatial"
-    assert any("the attitudes are" in sentence for sentence in result["departures"]["sentences"])
+    assert any("attitudes are" in sentence for sentence in result["departures"]["sentences"])
     differs = {row["key"] for row in result["differs"]}
     assert {"ground", "substeps"} <= differs and not {"grain", "seed", "bed_size"} & differs
     rows = {row["name"]: row for row in result["compared"]}
