@@ -41,6 +41,21 @@ def test_beds_that_differ_going_in_and_not_coming_back_are_told_as_both(differ):
     assert find_scatter(found, apart=True).model_std == (expected if differ else {})
 
 
+def test_the_mean_of_beds_moved_into_k_and_c_changes_no_force():
+    trials = [(f"{k}", "driven", 0.01, driven_trial(pushed(1.0), speed=0.01, retreat=True, seed=k)) for k in range(3)]
+    problem = make_problem(campaign_of(trials))
+    form = next(one for one in problem.forms if one.name == "stiffer unloading")
+    own = {f"{kind}[{k}]": value for kind, values in (("bed", (0.1, 0.2, 0.15)), ("bed damping", (-0.3, 0.1, 0.0)),
+           ("bed unloading", (0.2, -0.1, 0.3))) for k, value in enumerate(values)}  # fmt: skip
+    values = {"stiffness": 800.0, "damping": 5.0, form.amplitude: 1.5, **own}
+    moved = problem.centred(values, (form,))
+    assert moved["stiffness"] == pytest.approx(800 * 1.15) and moved["damping"] != 5.0
+    assert sum(moved[f"bed[{k}]"] for k in range(3)) == pytest.approx(0.0, abs=1e-12)
+    for trial in ("0", "1", "2"):
+        before, after = (problem.compare(one, (form,), trial)["force"]["model"] for one in (values, moved))
+        assert after == pytest.approx(before, rel=1e-12, abs=1e-12)
+
+
 def test_pushes_that_do_not_come_back_have_no_way_back_of_their_own():
     one = driven_trial(pushed(1.0), speed=0.01)
     assert "bed unloading" not in make_problem(campaign_of([("0", "driven", 0.01, one)])).scatter
