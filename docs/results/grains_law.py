@@ -11,13 +11,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from matplotlib.colors import to_hex
-from matplotlib.lines import Line2D
 
 from experiments.cli.main import main as hedgebed
 from vis.diagnose.figures import BASE, trials_of
 from vis.page.folder import Run, RunFolder, Series, read_columns, read_folder
-from vis.page.plots import MODEL, styled, title_above
+from vis.page.plots import styled, title_above
 from vis.penetrate.report import draw_amended
 
 HERE = Path(__file__).parent
@@ -65,11 +63,8 @@ def laws(folder: Path) -> RunFolder:
 def main() -> None:
     """Compute the laws and draw the picture."""
     with tempfile.TemporaryDirectory() as folder, styled():
-        drawing = draw_amended(beside(laws(Path(folder))))
+        drawing = draw_amended(beside(laws(Path(folder))), base=BASE)  # the colour of the base model in a diagnosis
         assert drawing is not None
-        for line in drawing.findobj(Line2D):  # the base model has the colour that it has in pictures of diagnoses
-            if to_hex(line.get_color()) == MODEL.lower():
-                line.set_color(BASE)
         title_above(drawing, trials_of(READINGS))
         drawing.savefig(HERE.parent / "images" / "diagnose-grains-law.png", dpi=130)
 

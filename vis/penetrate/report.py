@@ -145,8 +145,10 @@ def _amended_plot(run: RunFolder) -> Plot | None:
     return None if drawing is None else Plot.of("amended", drawing)
 
 
-def draw_amended(run: RunFolder) -> Figure | None:
-    """Force against depth of driven runs, depth against time of drops and set-downs; None where there is no law."""
+def draw_amended(run: RunFolder, *, base: str = MODEL) -> Figure | None:
+    """Force against depth of driven runs, depth against time of drops and set-downs; None where there is no law.
+
+    `base`: colour of the law without effects."""
     alone = "ground_file" in run.result
     driven, drops, stood = (
         [r for r in run.of_kind(kind) if r.amended is not None or alone] for kind in ("driven", "drop", "set_down")
@@ -159,13 +161,13 @@ def draw_amended(run: RunFolder) -> Figure | None:
     for row, group in zip(axes, groups, strict=True):
         for axis, (title, runs) in zip(row, group, strict=False):
             axis.set_title(title)
-            _draw_panel(axis, runs)
+            _draw_panel(axis, runs, base)
             if axis is not row[0]:
                 axis.set_ylabel("")
         for axis in row[len(group) :]:
             axis.set_visible(False)
     handles = [handle("bed", BED, lw=1.0)] if any(r.bed is not None for r in run.runs) else []
-    laws = [handle(str(run.result["ground"]) if alone else "spring-damper", MODEL, ls=DASHED)]
+    laws = [handle(str(run.result["ground"]) if alone else "spring-damper", base, ls=DASHED)]
     laws += [] if alone else [handle(f"with {words_of_effects(run.result)}", AMENDED)]
     legend_above(drawing, [*handles, *laws], 3)
     return drawing
@@ -203,12 +205,12 @@ def _by_speed(runs: Sequence[Run]) -> list[tuple[str, list[Run]]]:
     ]
 
 
-def _draw_panel(axis: Axes, runs: Sequence[Run]) -> None:
+def _draw_panel(axis: Axes, runs: Sequence[Run], base: str) -> None:
     """Force against depth of driven runs; of the others depth against the time since they came to depth 0."""
     driven = runs[0].kind == "driven"
     bed: Mapping[str, Any] = {"color": BED, "lw": 0.7, "alpha": 0.6} if driven else {"color": BED, "lw": 0.9}
     lines: list[tuple[Series | None, Mapping[str, Any]]] = [(r.bed, bed) for r in runs]
-    lines.append((runs[0].model, {"color": MODEL, "ls": DASHED, "lw": 1.8, "zorder": 3}))  # seen on the other law
+    lines.append((runs[0].model, {"color": base, "ls": DASHED, "lw": 1.8, "zorder": 3}))  # seen on the other law
     lines.append((runs[0].amended, {"color": AMENDED, "lw": 1.8}))
     for series, style in lines:
         if series is None:

@@ -370,7 +370,8 @@ class _Course:
 
     def _moved(self, choice: Choice, best: Fit) -> Choice:
         """The base model's fit and the best one as they are now; scores stay those by which all were compared."""
-        base, left = replace(choice.base, fit=self.base), open_gate(best, seed=self.asked.seed)[1]
+        left = open_gate(best, seed=self.asked.seed)[1]
+        base = replace(choice.base, fit=self.base)
         return replace(choice, base=base, best=replace(choice.best, fit=best), left=left)
 
     def _decided(self, choice: Choice) -> Diagnosis:
@@ -485,8 +486,8 @@ class _Course:
         """The gate on trials that took no part, with the scatter of replicates where it was found."""
         if not self.held_out:
             return None
-        own = held_out_fit(found.model, self.held_out, found.values)
-        return held_out_gate(found, self.held_out, own, seed=self.asked.seed)
+        values = held_out_fit(found.model, self.held_out, found.values)
+        return held_out_gate(found, self.held_out, values, seed=self.asked.seed)
 
     def _looking_at(self, others: tuple[str, ...]) -> Diagnosis:
         """The whole course once more with the held-out trials `others` fitted, and other ones held out."""

@@ -239,10 +239,7 @@ def write_diagnosis(folder: Path, found: Diagnosis) -> dict[str, Any]:
     notes: dict[str, Json] = {}
     used, aside = {*found.fitted, *found.held_out}, []
     modelled = {trial.id: problem.compare(found.best_values, found.forms, trial.id) for trial in problem.trials}
-    if (
-        problem.kind == "penetration"
-        and (ratios := peak_ratios([modelled[id] for id in (*found.fitted, *found.held_out)])) is not None
-    ):
+    if (ratios := peak_ratios([modelled[id] for id in (*found.fitted, *found.held_out)])) is not None:
         diagnosis["peaks"] = notes[PEAKS_NOTE] = ratios
     if others := [one["file"] for one in diagnosis["near_models"]]:
         notes[OTHERS_NOTE] = {"files": others}
