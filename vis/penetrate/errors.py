@@ -64,8 +64,8 @@ def contains_beds(entry: Any) -> bool:
 
 
 def fitted(result: Mapping[str, Any], numbers: Mapping[str, Any], key: str) -> str:
-    """K or C of `in_95` with its error over beds, or for one bed with that of the fit; K with its ends by chance where
-    the result has them, as the answer does."""
+    """K or C of `in_95` with its error over beds, or for one bed with that of the fit. K has its ends by chance, as in
+    the answer, where the result has them."""
     entry = mapping_of(numbers.get(key))
     if key == "stiffness" and (chance := _chance_of_k(result)):
         return f"{quote(value_of(numbers, key), None, _UNITS[key], significant=2)} ({between(*chance, _UNITS[key])})"
