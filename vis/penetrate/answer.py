@@ -117,18 +117,19 @@ def _among_real_grains(result: Entries, entry: Entries) -> Tile:
         ends = within(entry["low"], entry["high"], "m")
         return Tile("Sinkage among real grains (95 %)", ends, say("of_real_grains"))
     rest = words.mapping_of(result.get("rest"))
-    if rest.get("comes_to_rest") is True and len(ends := words.list_of(rest.get("depth_range"))) == 2:
-        return _by_cohesion(*ends, words.list_of(rest.get("depth_least_cohesion")))
+    bounds = words.list_of(rest.get("depth_range"))
+    if rest.get("comes_to_rest") is True and len(bounds) == 2:
+        return _by_cohesion(bounds, words.list_of(rest.get("depth_least_cohesion")))
     return Tile("Sinkage among real grains (95 %)", "not known", words.sentence(str(entry["sentence"])))
 
 
-def _by_cohesion(low: float, high: float, otherwise: Sequence[float]) -> Tile:
+def _by_cohesion(bounds: Sequence[float], otherwise: Sequence[float]) -> Tile:
     """What cohesion and the expected K give: at the surface, between two depths, or one or the other of these."""
-    label = "Sinkage by cohesion and expected K"
+    label, (low, high) = "Sinkage by cohesion and expected K", bounds
     if not high:
         return Tile(label, quote(0.0, 0.0, "m"), say("supported"))
-    if low == 0 and otherwise:
-        return Tile(label, f"0, or {between(*otherwise, 'm')}", say("supported_or_not"))
+    if low == 0 and len(otherwise) == 2:
+        return Tile(label, f"0, or {between(otherwise[0], otherwise[1], 'm')}", say("supported_or_not"))
     return Tile(label, between(low, high, "m"), say("bounds_of_k"))
 
 
