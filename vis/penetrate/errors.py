@@ -68,7 +68,8 @@ def fitted(result: Mapping[str, Any], numbers: Mapping[str, Any], key: str) -> s
     the answer, where the result has them."""
     entry = mapping_of(numbers.get(key))
     if key == "stiffness" and (chance := _chance_of_k(result)):
-        return f"{quote(value_of(numbers, key), None, _UNITS[key], significant=2)} ({between(*chance, _UNITS[key])})"
+        low, high = chance
+        return f"{quote(value_of(numbers, key), None, _UNITS[key], significant=2)} ({between(low, high, _UNITS[key])})"
     error = value_of(numbers, f"{key}_error")
     if entry.get("std") is None and error is not None:
         entry = {**entry, "std": error}
