@@ -6,11 +6,10 @@ from pathlib import Path
 
 from experiments import diagnose
 
-shipped = Path(diagnose.__file__).parents[1] / "examples"
-campaign = shipped / ("template-penetration" if "--small" in sys.argv else "cmu-plate-sinkage")
+campaign = "template-penetration" if "--small" in sys.argv else "cmu-plate-sinkage"  # both ship
 out = Path(sys.argv[sys.argv.index("--out") + 1] if "--out" in sys.argv else "runs/examples") / "diagnosis"
 
-diagnose.run(diagnose.Settings(campaign=str(campaign)), out)
+diagnose.run(diagnose.Settings(campaign=campaign), out)
 diagnosis = json.loads((out / "diagnosis.json").read_text(encoding="utf-8"))
 print(f"verdict: {diagnosis['verdict']}")
 for effect in diagnosis["effects"]:

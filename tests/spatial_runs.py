@@ -5,9 +5,11 @@ from pathlib import Path
 
 import numpy as np
 
+from rigid.platform.files import PLATFORM_FOLDER
+
 __all__ = ["BALL", "CUBE", "EXAMPLES", "LEG", "ball", "grain_bed", "model_of", "moving", "small_bed"]
 
-CUBE = Path(__file__).parents[1] / "experiments/examples/platform-cube/cube.toml"
+CUBE = PLATFORM_FOLDER / "cube.toml"
 """A cube on eight spikes, 30 mm across, with wheels about x and y, that ships."""
 
 

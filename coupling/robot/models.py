@@ -6,12 +6,13 @@ from typing import Any
 import numpy as np
 
 from rigid.checks import alike, nearest
+from rigid.checks.shipped import find_shipped
 from rigid.checks.unfit import UnfitSettingsError
 
 from .feet import refuse_missing
 
 __all__ = [
-    "LostRobotError", "actuators_of", "check_model", "find_example", "find_model", "joints_of", "keyframe_of",
+    "LostRobotError", "actuators_of", "check_model", "examples", "find_model", "joints_of", "keyframe_of",
     "load_model", "refuse_lost", "rises", "switch_off_floors",
 ]  # fmt: skip
 
@@ -27,27 +28,22 @@ class LostRobotError(UnfitSettingsError):
         self.remedy = remedy
 
 
-def find_example(name: str | Path, suffix: str) -> Path | None:
-    """The one file with `suffix` of the example that ships by this name; None where none has it, or a file has."""
-    path = Path(name)
+def examples(suffix: str) -> dict[str, Path]:
+    """The examples that ship, by name: of each its one file with `suffix`."""
     files = sorted(EXAMPLES.glob(f"mujoco-*/*{suffix}"))
-    own = [file for file in files if file.parent.name == f"mujoco-{path}"]
-    return own[0] if own and not path.is_file() else None
+    return {file.parent.name.removeprefix("mujoco-"): file for file in files}
 
 
 def find_model(name: str | Path) -> Path:
     """The file of a model: a path, or the name of an example that ships. Raises ValueError for neither."""
-    path = Path(name)
-    if shipped := find_example(name, ".xml"):
-        return shipped
-    if not path.is_file():
-        examples = sorted(file.stem for file in EXAMPLES.glob("mujoco-*/*.xml"))
-        beside = alike(path) if path.suffix else ""
-        raise ValueError(
-            f"model = {str(name)!r}: there is no such file{beside}; an MJCF or URDF file is accepted, or an "
-            f"example that ships: {nearest(str(name), examples)}"
-        )
-    return path
+    shipped = examples(".xml")
+    if found := find_shipped(name, shipped):
+        return found
+    beside = alike(name) if Path(name).suffix else ""
+    raise ValueError(
+        f"model = {str(name)!r}: there is no such file{beside}; an MJCF or URDF file is accepted, or an "
+        f"example that ships: {nearest(str(name), shipped)}"
+    )
 
 
 def load_model(path: str | Path) -> Any:

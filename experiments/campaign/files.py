@@ -24,6 +24,7 @@ from pydantic_core import ErrorDetails
 from experiments.runs.folder import toml_value, write_text
 from experiments.runs.given import keep_given, kept_copy
 from rigid.checks import alike, nearest, why_unread
+from rigid.checks.shipped import find_shipped
 from rigid.digests import check_as_written
 
 from .digests import changed_files, write_digests
@@ -78,14 +79,11 @@ class Campaign:
 
 
 def read_campaign(folder: str | Path) -> Campaign:
-    """Read the campaign in `folder`. Raises ValueError with all faults of the tables and of every file that can be
-    found, a sentence on a line each. A sentence names the file, the line or key, what was found and what was expected.
-    It also names each file that differs from its digest, where the folder has digests."""
-    folder = Path(folder)
-    if not folder.is_dir():
-        raise ValueError(
-            f"{str(folder)!r} is no folder: one with campaign.toml was expected{alike(folder, folders=True)}"
-        )
+    """Read the campaign in `folder`, or the one of this name that ships. Raises ValueError with all faults of the
+    tables and of every file that can be found, a sentence on a line each. A sentence names the file, the line or key,
+    what was found and what was expected. It also names each file that differs from its digest, where the folder has
+    digests."""
+    folder = _find_campaign(folder)
     path = folder / "campaign.toml"
     if not path.exists() and (within := folder / "campaign").joinpath("campaign.toml").exists():
         raise ValueError(f"{str(folder)!r} is a run folder: its campaign is {str(within)!r}")
@@ -111,6 +109,14 @@ def read_campaign(folder: str | Path) -> Campaign:
     if faults or tables is None:
         raise ValueError("\n".join(dict.fromkeys(faults)))
     return Campaign(tables, recordings, folder)
+
+
+def _find_campaign(given: str | Path) -> Path:
+    shipped = {path.parent.name: path.parent for path in sorted(TEMPLATES.glob("*/campaign.toml"))}
+    if found := find_shipped(given, shipped, folder=True):
+        return found
+    beside = alike(given, folders=True) or f", or one that ships: {nearest(str(given), shipped)}"
+    raise ValueError(f"{str(given)!r} is no folder: one with campaign.toml was expected{beside}")
 
 
 def write_campaign(folder: str | Path, campaign: Campaign) -> Path:

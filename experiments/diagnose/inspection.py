@@ -104,7 +104,8 @@ def _compute(settings: CheckSettings, folder: RunFolder, progress: Progress) -> 
     campaign = read_campaign(settings.campaign)
     progress.stage("check", total=1.0)
     infos, read = _read(campaign)
-    findings = [*unnamed_files(Path(settings.campaign), campaign), *_all_faults(campaign, read)]
+    home = campaign.folder or Path(settings.campaign)
+    findings = [*unnamed_files(home, campaign), *_all_faults(campaign, read)]
     recordings = []
     trials: Sequence[Any] = campaign.tables.trial
     for number, trial in enumerate(trials, 1):
@@ -113,7 +114,7 @@ def _compute(settings: CheckSettings, folder: RunFolder, progress: Progress) -> 
             series = folder.write_series(f"{number:03d}-{sensor}", recording.columns)
             recordings.append({"trial": trial.id, "sensor": sensor, "series": series} | _facts(recording))
     if settings.keep_digests:
-        keep_digests(settings.campaign, campaign)
+        keep_digests(home, campaign)
     return _result(campaign, recordings, findings, infos)
 
 

@@ -10,7 +10,9 @@ __all__ = ["CheckSettings", "DiagnoseSettings"]
 class DiagnoseSettings(StrictSettings):
     """What is diagnosed, and how much time that may take."""
 
-    campaign: str = Field(min_length=1, description="Folder of the measured trials, with campaign.toml.")
+    campaign: str = Field(
+        min_length=1, description="Folder of trials with campaign.toml, or the name of one that ships."
+    )
     thorough: bool = False
     """Calibrate the test for a missing effect with full refits of simulated campaigns (slow; kept for campaigns of the
     same design)."""
@@ -27,6 +29,8 @@ class DiagnoseSettings(StrictSettings):
 class CheckSettings(StrictSettings):
     """What is checked."""
 
-    campaign: str = Field(min_length=1, description="Folder of the measured trials, with campaign.toml.")
+    campaign: str = Field(
+        min_length=1, description="Folder of trials with campaign.toml, or the name of one that ships."
+    )
     keep_digests: bool = False
     """Write digests.json into the folder of the campaign: later, a file that has changed is refused by name."""

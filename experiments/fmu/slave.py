@@ -52,7 +52,7 @@ UNITS = (
 )  # fmt: skip
 TEXTS = {
     "surface": "Surface: steel, brick, sand, sand-weak, jsc1a or jsc1a-heights",
-    "platform": "Platform: hedgehog, cubli, mascot, minerva, or a TOML file",
+    "platform": "Platform: hedgehog, cubli, mascot, minerva, cube, or a TOML file",
 }
 NUMBERS = {
     "gravity": ("m/s2", "Gravity of a free platform; below 0: the rig is used"),

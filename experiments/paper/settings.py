@@ -40,7 +40,7 @@ class PaperSettings(StrictSettings):
     """Compare explanations for the statements about hard surfaces: a torque that rises slowly, and others. It needs
     steel and brick, two rigs and two torques of the motor."""
     platform: str = Field(
-        "hedgehog", description="Platform: hedgehog, cubli, mascot, minerva, or a TOML file (docs/platform.md)."
+        "hedgehog", description="Platform: hedgehog, cubli, mascot, minerva, cube, or a TOML file (docs/platform.md)."
     )
     brake_wheel_speed: Positive = 300.0
     """Initial speed of the wheel in trials with the brake [rad/s]. The paper states none; the default is ours."""

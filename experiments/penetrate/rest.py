@@ -41,7 +41,7 @@ def made_units(settings: PenetrateSettings, units: Sequence[Unit]) -> list[Unit]
 def answer(findings: Findings, material: Any) -> Json | None:
     """The entry "rest" of result.json: how deep the load would rest, and what cohesion would change.
 
-    Where a set-down came to rest: what Terzaghi's formula gives for a flat foot in grains that stick (`_stuck`), else
+    Where a set-down came to rest: what cohesion and K give for a flat foot in grains that stick (`_stuck`), else
     None. None too where a set-down ended otherwise than at rest or at the floor.
     """
     settings = findings.settings
@@ -65,7 +65,8 @@ def answer(findings: Findings, material: Any) -> Json | None:
         "s": settings, "depth": _length(depths[0]), "foot": 1e3 * settings.foot, "floor": 1e3 * settings.bed_size[2],
         "plate": _length(depths[1]),
         "angle": angle, "enough": f"{enough:.2g}", "g": settings.gravity / STANDARD_GRAVITY,
-        "driven": 1e3 * settings.depth, "of_k": "the fitted K" if findings.fit.stiffness > 0 else "the K expected",
+        "driven": 1e3 * settings.depth, "of_k": "the fitted K" if findings.fit.stiffness > 0 else "the expected K",
+        "body": say("body_first"),
     }  # fmt: skip
     beside = _beside(settings) if material.cohesion == "none" else None
     sentences = [say("rests_never" if never else "rests_below_the_bed", **told)]
@@ -85,7 +86,7 @@ def _beside(settings: PenetrateSettings) -> Json:
 
     Friction angle and K are those of `_BESIDE`, not of these grains: N_c grows from 32 at 31 degrees to 55 at 37.
     """
-    found, told = _by_terzaghi(settings, MATERIALS[_BESIDE])
+    found, told = _by_cohesion(settings, MATERIALS[_BESIDE])
     verdict = say(f"beside_{told.pop('verdict')}", **told)
     return found | {"sentence": say("try_cohesive", **told, verdict=verdict)}
 
@@ -97,20 +98,21 @@ def _stuck(settings: PenetrateSettings, material: Any) -> Json | None:
     recipe = recipe_of(material)
     if recipe.cohesion is None or recipe.cohesion_std is None or recipe.circle is None:
         return None
-    found, told = _by_terzaghi(settings, material)
+    found, told = _by_cohesion(settings, material)
     verdict = say(f"sticky_{told.pop('verdict')}", **told)
+    verdict += f". {say('body_first')}" if found["depth_range"][1] > settings.foot else ""
     return {
         "comes_to_rest": True, "load": settings.weight, **found,
         "sentences": [say("on_sticky", **told, mm=1e3 * settings.grain, verdict=verdict)], "source": say("terzaghi"),
     }  # fmt: skip
 
 
-def _by_terzaghi(settings: PenetrateSettings, material: Any) -> tuple[Json, Json]:
+def _by_cohesion(settings: PenetrateSettings, material: Any) -> tuple[Json, Json]:
     """The cohesion that a material has and needs, and the depths [m] where K carries the rest of the load.
 
     The ends are those of the 95 % interval of the cohesion, which is not below 0. K is the one expected of the
-    material, times `UNSURE` at the lower end and over it at the upper. Returns the numbers, and what the sentences on
-    them take, with "verdict": holds, sinks or open.
+    material, times `UNSURE` at the lower end and over it at the upper. "depth_least_cohesion" has both ends of K at the
+    least cohesion. Returns the numbers, and what the sentences on them take, with "verdict": holds, sinks or open.
     """
     recipe, area = recipe_of(material), math.pi * settings.tip_diameter**2 / 4
     assert recipe.cohesion is not None and recipe.cohesion_std is not None and recipe.circle is not None
@@ -121,17 +123,21 @@ def _by_terzaghi(settings: PenetrateSettings, material: Any) -> tuple[Json, Json
     shares = [max(0.0, 1.0 - most / min(needs)), max(0.0, 1.0 - least / max(needs))]
     stiffness = bearing_of(material, grain=settings.grain, gravity=settings.gravity, area=area).stiffness
     low, high = load * shares[0] / (UNSURE * stiffness), load * shares[1] * UNSURE / stiffness
+    least_low = load * shares[1] / (UNSURE * stiffness)
     found: Json = {
         "material": material.name, "cohesion": recipe.cohesion, "cohesion_std": recipe.cohesion_std,
         "friction_angles": [angle, recipe.circle], "cohesions_enough": needs, "depth_range": [low, high],
-        "stiffness": stiffness,
+        "depth_least_cohesion": [least_low, high], "stiffness": stiffness,
     }  # fmt: skip
     told: Json = {
         "name": material.name, "beside": material.name, "cohesion": recipe.cohesion, "least": least, "most": most,
         "angle": angle, "circle": recipe.circle, "large": f"{needs[0]:.2g}", "peak": f"{needs[1]:.2g}",
-        "low": _length(low), "high": _length(high), "verdict": "holds" if high == 0 else "sinks" if low > 0 else "open",
+        "low": _length(low), "high": _length(high), "least_low": _length(least_low),
+        "without": f"with {least:.2g} Pa" if least > 0 else "without cohesion",
+        "bounds": say("bounds"),
+        "verdict": "holds" if high == 0 else "sinks" if low > 0 else "open",
     }  # fmt: skip
-    return found, told
+    return found, told | {"branches": say("branches", **told)}
 
 
 def sinkage_interval(findings: Findings, material: Any) -> Interval | None:

@@ -20,7 +20,7 @@ from rigid.model.trial import Trial
 from rigid.planar.dynamics import System
 from rigid.planar.simulate import simulate
 from rigid.planar.trajectory import Trajectory
-from rigid.platform.files import find_platform
+from rigid.platform.files import find_platform, platform_file
 from rigid.platform.platform import Platform
 
 from . import say
@@ -169,10 +169,10 @@ def keep_platform(name: str, folder: Path, message: Callable[[str], object] | No
     ``message`` is called where the file differs from the copy. Raises ValueError for a bad file without a copy, and for
     a damaged copy.
     """
-    if Path(name).suffix != ".toml":
-        return None
     kept = kept_copy(folder, PLATFORM_COPY)
     if kept is None:
+        if platform_file(name) != Path(name):
+            return None
         find_platform(name)
         kept = keep_given(folder, PLATFORM_COPY, Path(name).read_bytes())
     elif message is not None and not _same(Path(name), kept):

@@ -44,8 +44,8 @@ class PlatformSettings(StrictSettings):
 
     # The platform
     platform: str = "hedgehog"
-    """Platform: hedgehog, cubli, mascot, minerva, or a TOML file (docs/platform.md). It gives the numbers below that
-    are not given."""
+    """Platform: hedgehog, cubli, mascot, minerva, cube, or a TOML file (docs/platform.md). It gives the numbers below
+    that are not given."""
     mass: Positive | None = Field(
         None, description="Mass of the platform [kg]; from its file if not given (hedgehog: 5.3)."
     )

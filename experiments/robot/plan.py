@@ -14,13 +14,14 @@ import numpy as np
 
 from coupling.robot import LawFeet, LostRobotError, MujocoRobot, load_model
 from coupling.robot.feet import Part, refuse_missing
-from coupling.robot.models import find_example
+from coupling.robot.models import examples
 from coupling.robot.soles import FeetLaw, compared_speeds, plan_area, sole_of
 from experiments.platform.ground_file import fitted_ground
 from experiments.platform.settled import Number, refuse_other_grains
 from experiments.platform.surfaces import Surface, find_surface, surface_of_grains
 from experiments.runs.given import keep_given, kept_copy
 from rigid.checks import alike
+from rigid.checks.shipped import find_shipped
 from rigid.ground.laws import find_law
 from rigid.ground_file import GroundFile
 from rigid.platform.rig import STANDARD_GRAVITY
@@ -261,7 +262,7 @@ def width_of(part: Part, matrix: Any) -> float:
 def _controller_file(controller: str) -> tuple[Path, str]:
     """The file, which an example that ships has by its name too, and the function in FILE:FUNCTION."""
     file, _, name = controller.rpartition(":")
-    return (find_example(file, ".py") if file else None) or Path(file), name
+    return find_shipped(file, examples(".py")) or Path(file), name
 
 
 def _controller(settings: RobotSettings, folder: Path | None) -> Controller | None:

@@ -46,7 +46,7 @@ class SpatialSettings(GrainsSettings):
 
     # The platform, and what carries part of it
     platform: str = Field(
-        "hedgehog", description="Platform: hedgehog, cubli, mascot, minerva, or a TOML file (docs/platform.md)."
+        "hedgehog", description="Platform: hedgehog, cubli, mascot, minerva, cube, or a TOML file (docs/platform.md)."
     )
     rig: Positive | None = None
     """Simulated gravity g_sim of the offloading rig, in g [9.80665 m/s2]; 0.0085 if neither rig nor gravity is

@@ -8,13 +8,14 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from rigid.checks import nearest, read_toml
+from rigid.checks.shipped import find_shipped
 
 from .actuation import Flywheel
 from .inertia import Part, combine
 from .platform import Platform
 from .solids import box_vertices, prism_vertices, rhombicuboctahedron_vertices
 
-__all__ = ["PLATFORM_FOLDER", "find_platform", "platform_names", "read_platform"]
+__all__ = ["PLATFORM_FOLDER", "find_platform", "platform_file", "platform_names", "read_platform"]
 
 PLATFORM_FOLDER = Path(__file__).parents[1] / "platforms"  # Where those are that ship
 
@@ -106,22 +107,24 @@ def platform_names() -> list[str]:
     return sorted(path.stem for path in PLATFORM_FOLDER.glob("*.toml"))
 
 
+def platform_file(name: str | Path) -> Path:
+    """The TOML file `name`, or that of the platform of this name that ships. Raises ValueError for neither."""
+    path, shipped = Path(name), {one: PLATFORM_FOLDER / f"{one}.toml" for one in platform_names()}
+    if found := path if path.suffix == ".toml" else find_shipped(name, shipped):
+        return found  # a file of that ending that is not there: its reading says so
+    raise ValueError(
+        f"platform = {str(name)!r} is neither a platform that ships nor the path of a .toml file; "
+        f"{nearest(str(name), shipped)}"
+    )
+
+
 def find_platform(name: str | Path) -> Platform:
     """The platform in the TOML file `name`, or the one of that name that ships. Raises as `read_platform`.
 
     >>> find_platform("hedgehog").mass
     5.3
     """
-    path = Path(name)
-    if path.suffix == ".toml":
-        return read_platform(path)
-    shipped = PLATFORM_FOLDER / f"{name}.toml"
-    if path.parent == Path() and shipped.is_file():
-        return read_platform(shipped)
-    raise ValueError(
-        f"platform = {str(name)!r} is neither a platform that ships nor the path of a .toml file; "
-        f"{nearest(str(name), platform_names())}"
-    )
+    return read_platform(platform_file(name))
 
 
 def read_platform(path: Path) -> Platform:

@@ -19,6 +19,7 @@ from experiments.campaign.files import new_campaign
 from experiments.cli.main import main
 from experiments.penetrate import beds
 from experiments.runs.folder import RunFolder
+from rigid.platform.files import PLATFORM_FOLDER
 
 __all__ = ["KINDS", "Kind", "patched"]
 
@@ -117,9 +118,9 @@ def copies() -> None:
     """Stopped runs that keep copies of what they were given: a law, a platform, a material."""
     done(f"calibrate {case(CALIBRATE)} --out fitted")
     shutil.copy("fitted/ground.toml", "law.toml")
-    shutil.copytree(Path(experiments.__file__).parent / "examples" / "platform-cube", "cube")
+    shutil.copy(PLATFORM_FOLDER / "cube.toml", "cube.toml")
     shutil.copy(Path(dem.__file__).parent / "presets" / "sand.toml", "mine.toml")
-    done("tumble --duration 0.1 --ground law.toml --platform cube/cube.toml --rig 0.03 --out tumbled")
+    done("tumble --duration 0.1 --ground law.toml --platform cube.toml --rig 0.03 --out tumbled")
     done(f"penetrate {case(CASE)} --material mine.toml --out run")
     for name in ("tumbled", "run"):
         unfinished(name)

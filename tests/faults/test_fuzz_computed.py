@@ -18,10 +18,10 @@ from shutil import rmtree
 import pytest
 from faults.fuzzing import ALL, CASES, in_words, kept, outcome
 
-import experiments
 from experiments.runs import whole_runs
 from experiments.runs.registry import EXPERIMENTS, TOO_LARGE
 from rigid.ground.laws import GROUNDS
+from rigid.platform.files import PLATFORM_FOLDER
 from rigid.result import toml_value
 from rigid.terms import EFFECTS
 
@@ -182,7 +182,7 @@ def drawn(number):
 def files(tmp_path, monkeypatch):
     """The files that the cases name, in the present folder."""
     monkeypatch.chdir(tmp_path)
-    cube = Path(experiments.__file__).parent / "examples" / "platform-cube" / "cube.toml"
+    cube = PLATFORM_FOLDER / "cube.toml"
     Path("cube.toml").write_text(cube.read_text(encoding="utf-8"), encoding="utf-8")
     Path("model.toml").write_text(MODEL, encoding="utf-8")
     with pytest.MonkeyPatch.context() as patch:

@@ -9,10 +9,10 @@ import pytest
 from faults.damaged_folders import CALIBRATE, Kind, case, patched
 
 import dem
-import experiments
 from benchmarks.view import Browser, chromium
 from experiments.campaign.files import new_campaign
 from experiments.cli.main import main
+from rigid.platform.files import PLATFORM_FOLDER
 from vis.report import write_report
 from vis.view.page import write_view
 
@@ -102,7 +102,7 @@ NAME = "<img src=x onerror='window.taken = 1'>"
 
 def own_platform(name):
     """Write a platform file of this name; the file."""
-    shipped = Path(experiments.__file__).parent / "examples" / "platform-cube" / "cube.toml"
+    shipped = PLATFORM_FOLDER / "cube.toml"
     text = shipped.read_text(encoding="utf-8").replace('name = "cube"', f"name = {json.dumps(name)}")
     Path(f"{name}.toml").write_text(text, encoding="utf-8")
     return f"{name}.toml"

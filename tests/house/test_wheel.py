@@ -31,6 +31,7 @@ BASE = (
     "tumble --out runs/tumble",
     "hop --out runs/hop",
     "campaign new mine --kind penetration",
+    "campaign check cmu-plate-sinkage --out runs/check",
     "diagnose mine --out runs/diagnosis",
     "view runs/tumble --no-open",
     "experiments list",

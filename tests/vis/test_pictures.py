@@ -127,6 +127,23 @@ def test_the_undisturbed_surface_is_dashed_across_the_cut(monkeypatch):
     assert line.get_xydata().tolist() == [[0.2, 0.6], [0.8, 0.6]]
 
 
+@pytest.mark.parametrize(("newtons", "shown", "long"), [(68.8, "10 N", 10 / 68.8), (2.0, "0.5 N", 0.25)])
+def test_the_arrow_of_a_force_has_a_scale_beside_the_length(monkeypatch, newtons, shown, long):
+    """The arrow of a round force, in fractions of the height of a picture of 4:3, on the line of the length."""
+    drawn = []
+    monkeypatch.setattr(canvas, "pixels", lambda figure: drawn.append(figure))
+    page = canvas.Page((400, 300), "displacement", 1.0)
+    places = {"place": lambda points: points[:, [0, 2]], "section": (0.2, 0.8, 0.0, 0.2, 0.6)}
+    page.compose("A title", "", lambda axis: None, **places, newtons=newtons)
+    page.compose("A title", "", lambda axis: None, **places)
+    (arrow,) = (text for text in drawn[0].axes[0].texts if getattr(text, "arrow_patch", None) is not None)
+    assert 4 / 3 * (arrow.xy[0] - arrow.xyann[0]) == pytest.approx(long)
+    assert shown in [text.get_text() for text in drawn[0].axes[0].texts]
+    assert not any(text.get_text().endswith(" N") for text in drawn[1].axes[0].texts)
+    (ruler,) = (text for text in drawn[0].axes[0].texts if text.get_text().endswith("00 mm"))
+    assert ruler.get_position()[1] == pytest.approx(arrow.xy[1] - 0.012)
+
+
 def test_words_of_a_page_stay_on_it_and_off_the_bed(monkeypatch, needs_opengl):
     """The longest small print and four lines of numbers, around a bed that is wide and one that is deep."""
     drawn = []

@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import sys
 from html.parser import HTMLParser
+from pathlib import Path
 
 import golden
 import numpy as np
@@ -446,6 +447,19 @@ def test_the_rooms_own_names_are_loaded_when_asked_for():
     subprocess.run([sys.executable, "-c", code], check=True)
     with pytest.raises(AttributeError, match="no attribute 'write_raport'"):
         vis.write_raport
+
+
+def test_k_has_one_error_in_the_answer_in_words_and_in_the_table_of_fits():
+    """320 less 160 and more 320 are 160 to 640; the error of the fit to all beds would be another of the same K."""
+    folder = Path(__file__).parents[2] / "docs/results/penetrate-foot-sand-1g"
+    told = summarise(read_folder(folder))
+    (tile,) = (tile for tile in told["tiles"] if "stiffness" in tile["label"])
+    assert [re.sub(r"\D+", " ", one).split() for one in (tile["value"], tile["errors"][0])] == [["320"], ["160", "320"]]
+    k = "320 N/m (160 to 640 N/m)"
+    assert told["fit"]["table"]["rows"][0][1].replace("\N{NO-BREAK SPACE}", " ") == k
+    (words,) = (one["answer"] for one in told["answers"] if "error" in one["question"])
+    assert k in words.replace("\N{NO-BREAK SPACE}", " ")
+    assert "78" not in told["fit"]["note"]
 
 
 def test_a_number_has_half_of_the_interval_over_the_beds_that_have_it(tmp_path, make_run):

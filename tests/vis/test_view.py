@@ -11,6 +11,7 @@ import pytest
 from import_graph import ROOT
 
 from benchmarks.view import bed_of
+from dem import Bed
 from experiments.cli.main import BAD_INPUT, DONE, main
 from vis.page.answer import write_page
 from vis.page.page import Page, Section
@@ -222,6 +223,25 @@ def test_a_notebook_shows_a_run_or_a_bed_in_a_frame_of_its_own(make_run, tmp_pat
     assert scenes[0]["grains"]["count"] == 30
     with pytest.raises(ValueError, match="list"):
         View([1, 2])
+
+
+def test_a_bed_as_the_last_line_of_a_cell_shows_itself_once_vis_is_imported(monkeypatch):
+    """As IPython has it: a formatter of text/html for a class by the name of its module and its own, found later."""
+    from types import SimpleNamespace
+
+    import vis
+
+    known = {}
+    html = SimpleNamespace(for_type_by_name=lambda module, name, show: known.update({(module, name): show}))
+    shell = SimpleNamespace(display_formatter=SimpleNamespace(formatters={"text/html": html}))
+    for running in (None, shell):
+        monkeypatch.setitem(sys.modules, "IPython", SimpleNamespace(get_ipython=lambda running=running: running))
+        vis._show_beds()
+    ((place, show),) = known.items()
+    assert place == (Bed.__module__, Bed.__name__)
+    arrays = {"position": np.random.default_rng(1).random((30, 3)), "radius": np.full(30, 0.01), "id": np.arange(30)}
+    bed = SimpleNamespace(time=0.5, grains=lambda: SimpleNamespace(as_dict=lambda: arrays))
+    assert show(bed).startswith("<iframe")
 
 
 def test_a_run_that_goes_on_is_shown_again_until_it_ends(make_run, tmp_path, monkeypatch):

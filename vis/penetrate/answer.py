@@ -116,13 +116,21 @@ def _among_real_grains(result: Entries, entry: Entries) -> Tile:
     if entry["low"] is not None:
         ends = within(entry["low"], entry["high"], "m")
         return Tile("Sinkage among real grains (95 %)", ends, say("of_real_grains"))
-    note, rest = words.sentence(str(entry["sentence"])), words.mapping_of(result.get("rest"))
-    between_which = words.list_of(rest.get("depth_range"))
-    if rest.get("comes_to_rest") is True and len(between_which) == 2:
-        low, high = between_which
-        by_formula = between(low, high, "m") if high else quote(0.0, 0.0, "m")
-        return Tile("Sinkage by Terzaghi, cohesion at 95 %", by_formula, note)
-    return Tile("Sinkage among real grains (95 %)", "not known", note)
+    rest = words.mapping_of(result.get("rest"))
+    bounds = words.list_of(rest.get("depth_range"))
+    if rest.get("comes_to_rest") is True and len(bounds) == 2:
+        return _by_cohesion(bounds, words.list_of(rest.get("depth_least_cohesion")))
+    return Tile("Sinkage among real grains (95 %)", "not known", words.sentence(str(entry["sentence"])))
+
+
+def _by_cohesion(bounds: Sequence[float], otherwise: Sequence[float]) -> Tile:
+    """What cohesion and the expected K give: at the surface, between two depths, or one or the other of these."""
+    label, (low, high) = "Sinkage by cohesion and expected K", bounds
+    if not high:
+        return Tile(label, quote(0.0, 0.0, "m"), say("supported"))
+    if low == 0 and len(otherwise) == 2:
+        return Tile(label, f"0, or {between(otherwise[0], otherwise[1], 'm')}", say("supported_or_not"))
+    return Tile(label, between(low, high, "m"), say("bounds_of_k"))
 
 
 def _beyond(result: Entries, needed: float, load: str, law: str) -> list[Tile]:

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from rigid.intervals import NORMAL, half_width, student
-from vis.page.numbers import quantity, quote
+from vis.page.numbers import between, quantity, quote
 from vis.penetrate.summary_parts import fit_error, joined, list_of, mapping_of, say, std_of, value_of
 
 __all__ = ["contains_beds", "error_words", "fit_part", "fitted", "half_of", "half_of_fit", "in_95"]
@@ -63,13 +63,22 @@ def contains_beds(entry: Any) -> bool:
     return "scatter of the beds" in str(mapping_of(entry).get("note", ""))
 
 
-def fitted(numbers: Mapping[str, Any], key: str) -> str:
-    """K or C of `in_95` with its error over beds, or for one bed with that of the fit."""
+def fitted(result: Mapping[str, Any], numbers: Mapping[str, Any], key: str) -> str:
+    """K or C of `in_95` with its error over beds, or for one bed with that of the fit. K has its ends by chance, as in
+    the answer, where the result has them."""
     entry = mapping_of(numbers.get(key))
+    if key == "stiffness" and (chance := _chance_of_k(result)):
+        low, high = chance
+        return f"{quote(value_of(numbers, key), None, _UNITS[key], significant=2)} ({between(low, high, _UNITS[key])})"
     error = value_of(numbers, f"{key}_error")
     if entry.get("std") is None and error is not None:
         entry = {**entry, "std": error}
     return quantity(entry) if entry else "unknown"
+
+
+def _chance_of_k(result: Mapping[str, Any]) -> list[float]:
+    """Ends of the interval of K by chance [N/m]; none where it is not known."""
+    return list_of(mapping_of(mapping_of(result.get("sure")).get("stiffness")).get("chance"))
 
 
 def fit_part(result: Mapping[str, Any], numbers: Mapping[str, Any]) -> dict[str, Any] | None:
@@ -79,7 +88,7 @@ def fit_part(result: Mapping[str, Any], numbers: Mapping[str, Any]) -> dict[str,
         return None
     one = len(own) < 2
     gap = quantity(numbers.get("drag_gap"), unit="%")
-    rows = [["this bed" if one else "all beds together", *(fitted(numbers, key) for key in _UNITS), gap]]
+    rows = [["this bed" if one else "all beds together", *(fitted(result, numbers, key) for key in _UNITS), gap]]
     halves = [{key: half_of_fit(result, fit, key) for key in _UNITS} for fit in own]
     for i, fit in enumerate([] if one else own):
         gap = quote(value_of(fit, "drag_gap"), None, "%") if "drag_gap" in fit else "\N{EN DASH}"
@@ -91,13 +100,15 @@ def fit_part(result: Mapping[str, Any], numbers: Mapping[str, Any]) -> dict[str,
         for name, key in (("K", "stiffness_error"), ("C", "damping_error"))
         if value_of(numbers, key) is not None
     ]
+    of_beds = std_of(numbers, "stiffness") is not None  # then one error of K is enough
     if one:
         notes = [say("fit_one_bed")] if value_of(numbers, "stiffness_error") is not None else []
+        notes += [say("fit_kept")] if _chance_of_k(result) else []
     else:
         known = any(half is not None for both in halves for half in both.values())
-        notes = [say("fit_errors", errors=joined(errors))] if errors else []
+        notes = [say("fit_errors", errors=joined(errors))] if errors and not of_beds else []
         notes += [say("fit_spread")] if known else []
-    head = ["fitted to", "K (± 95 %)", "C (± 95 %)", "drag gap (± 95 %)"]
+    head = ["fitted to", "K (95 %)", "C (95 %)", "drag gap (95 %)"]
     return {"table": {"head": head, "rows": rows}, "note": " ".join(notes)}
 
 

@@ -133,8 +133,9 @@ def _answers(run: RunFolder, quantities: Mapping[str, Any]) -> list[dict[str, st
             text += " " + _returned(quantities)
         answers[f"How large is the force of {grains_of(run.result)}?"] = text
     if words.value_of(quantities, "drag_gap") is not None:
+        k, c = (fitted(run.result, quantities, key) for key in ("stiffness", "damping"))
         text = (
-            f"With K = {fitted(quantities, 'stiffness')} and C = {fitted(quantities, 'damping')} its "
+            f"With K = {k} and C = {c} its "
             f"error during loading is {quantity(quantities['drag_gap'], unit='%')} of the bed's drag (rms difference "
             "over rms drag)."
         )

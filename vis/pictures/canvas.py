@@ -56,6 +56,8 @@ _SMALL, _LETTERS = 9.5, 100
 """Size of the small print [points], and how many letters a line of it has at most across a page."""
 BED_SPACE = (0.125, 0.865, 0.15, 0.78)
 """Left, right, foot and head of a bed on a page: beside the scales, over the small print, below title and numbers."""
+_SCALE, _SCALE_END = 0.25, 0.825
+"""Of the scale of arrows: most of its length, over the page's height, and where it ends, over its width."""
 _RIM = 0.01
 """Left free at the picture's edge by an arrow that is cut, in fractions of it."""
 Place = Callable[[NDArray[np.float64]], NDArray[np.float64]]
@@ -147,6 +149,7 @@ class Page:
         section: tuple[float, float, float, float, float],
         note: str = "",
         arrow: NDArray[np.float64] | None = None,
+        newtons: float = 0.0,
     ) -> NDArray[np.uint8]:
         """The finished picture, shape (height, width, 3).
 
@@ -154,7 +157,7 @@ class Page:
         axes that fills the page, in the page's fractions. ``place``: Where a point of the bed lies on the page.
         ``section``: Of the plane of the cut: x of its left and right end, its y, z of the floor and of the undisturbed
         surface [m]. ``note``: Small print at the foot. ``arrow``: Foot and head of that of a force, in the page's
-        fractions, shape (2, 2).
+        fractions, shape (2, 2). ``newtons``: Force of an arrow as long as the picture is high [N]; 0: there are none.
         """
         with styled():
             figure = blank_page(self.size, 8.0)
@@ -162,7 +165,9 @@ class Page:
             axis.set_axis_off()
             axis.set(xlim=(0.0, 1.0), ylim=(0.0, 1.0), autoscale_on=False)
             draw(axis)
-            self._rulers(axis, place, section)
+            foot_line = self._rulers(axis, place, section)
+            if newtons > 0.0:
+                self._arrow_scale(axis, foot_line, newtons)
             if arrow is not None:
                 axis.annotate("", arrow[1], arrow[0], arrowprops=FORCE)
             figure.text(0.03, 0.965, title, fontsize=16, fontweight="bold", va="top", bbox=HALO)
@@ -186,8 +191,16 @@ class Page:
         bar.outline.set_visible(False)  # type: ignore[operator]
         return bar
 
-    def _rulers(self, axis: Any, place: Place, section: tuple[float, float, float, float, float]) -> None:
-        """Depth below the surface along the left edge of the cut, a length along its foot."""
+    def _arrow_scale(self, axis: Any, height: float, newtons: float) -> None:
+        """An arrow of a round force at the right of the page's foot, opposite the length, at this `height` of it."""
+        force = _round_below(_SCALE * newtons)
+        long = force / newtons * self.size[1] / self.size[0]
+        axis.annotate("", (_SCALE_END, height), (_SCALE_END - long, height), arrowprops=FORCE)
+        place = {"ha": "center", "va": "top", "fontsize": 11}
+        axis.text(_SCALE_END - 0.5 * long, height - 0.022, f"{force:g} N", **place)
+
+    def _rulers(self, axis: Any, place: Place, section: tuple[float, float, float, float, float]) -> float:
+        """Depth below the surface along the left edge of the cut, a length along its foot; at which height that is."""
         left, right, y, floor, surface = section
         step = _ruler_step(surface - floor)
         offset = 0.025 * (right - left)
@@ -219,8 +232,9 @@ class Page:
         ends = line([(left, y, low), (right_end, y, low)], color=INK, lw=1.6)
         for end in (left, right_end):
             line([(end, y, low - tick), (end, y, low + tick)], color=INK, lw=1.6)
-        x, z = ends[:, 0].mean(), ends[:, 1].min() - 0.012
-        axis.text(x, z, f"{1e3 * step:g} mm", ha="center", va="top", fontsize=11)
+        x, z = ends[:, 0].mean(), ends[:, 1].min()
+        axis.text(x, z - 0.012, f"{1e3 * step:g} mm", ha="center", va="top", fontsize=11)
+        return float(z)
 
 
 def blank_page(size: tuple[int, int], inches: float) -> Figure:
@@ -250,6 +264,12 @@ def pixels(figure: Figure, *, over: Any = None) -> NDArray[np.uint8]:
         figure.patch.set_visible(False)
         figure.draw(canvas.get_renderer())  # type: ignore[no-untyped-call]
     return np.asarray(canvas.buffer_rgba())[..., :3].copy()
+
+
+def _round_below(value: float) -> float:
+    """The next of 1, 2, 5 times a power of ten not above `value`, which is above 0."""
+    power = 10.0 ** np.floor(np.log10(value))
+    return float(max(n * power for n in (1.0, 2.0, 5.0) if n * power <= value * (1 + 1e-9)))
 
 
 def _ruler_step(length: float) -> float:

@@ -113,7 +113,8 @@ def _images(folder: Path, view: View, opengl: bool) -> Iterator[NDArray[np.uint8
             draw = partial(drawer.draw, frame=frame, colours=page.colours(frame.grains))
             ends = None if not force else _arrow(drawer, frame, view["cut"], _LONG * force / view["strongest"])
             yield page.compose(
-                view["title"], line, draw, place=drawer.place, section=section, note=note, arrow=ends
+                view["title"], line, draw, place=drawer.place, section=section, note=note, arrow=ends,
+                newtons=view["strongest"] / _LONG if any(view["forces"]) else 0.0,
             )  # fmt: skip
 
 

@@ -11,7 +11,10 @@ from typing import Any
 from vis.pictures.frames import GRAIN_FIELDS, FrameWriter
 from vis.view.page import write_view
 
-__all__ = ["View"]
+__all__ = ["View", "html_of_bed"]
+
+_UNASKED = 6e6
+"""Most bytes of the data of a bed that a notebook shows by itself."""
 
 
 class View:
@@ -43,6 +46,11 @@ class View:
             f'<iframe srcdoc="{source}" width="100%" height="{self.height}" style="border: 0" '
             'sandbox="allow-scripts" title="hedgebed view"></iframe>'
         )
+
+
+def html_of_bed(bed: Any) -> str:
+    """The frame of a bed that is the last line of a cell."""
+    return View(bed, size=_UNASKED)._repr_html_()
 
 
 def _write_bed(bed: Any, home: Path) -> None:

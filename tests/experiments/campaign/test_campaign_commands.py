@@ -13,7 +13,7 @@ from penetration_campaigns import campaign_of, driven_trial, drop_trial
 from dem import Material
 from experiments.campaign import Campaign, Recording, read_campaign, write_campaign
 from experiments.campaign import tables as known
-from experiments.campaign.files import new_campaign
+from experiments.campaign.files import TEMPLATES, new_campaign
 from experiments.check import template_warning
 from experiments.cli.main import main
 from experiments.diagnose.inspection import find_faults
@@ -35,6 +35,22 @@ TABLES = {
         known.PenetrationTrial,
     ),
 }  # fmt: skip
+
+
+# The name of one that ships
+
+
+def test_a_campaign_that_ships_is_found_by_its_name_after_a_folder_of_that_name(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert read_campaign("cmu-plate-sinkage").tables.name == read_campaign(TEMPLATES / "cmu-plate-sinkage").tables.name
+    assert main(["campaign", "check", "cmu-plate-sinkage", "--out", "checked", "--quiet"]) == 0
+    new_campaign("cmu-plate-sinkage", kind="tumble")
+    assert read_campaign("cmu-plate-sinkage").tables.kind == "tumble"
+    capsys.readouterr()
+    assert main(["diagnose", "cmu-plate-sinkag", "--out", "made"]) == 2
+    assert "mean 'cmu-plate-sinkage'" in capsys.readouterr().err
+    assert main(["diagnose", "nowhere", "--out", "made"]) == 2
+    assert "cmu-plate-sinkage, cmu-plates-against-bed," in capsys.readouterr().err
 
 
 # new

@@ -332,7 +332,13 @@ def test_a_foot_on_coarse_grains_that_stick_is_held_against_terzaghi(fake, tmp_p
     assert verdict in rest["sentences"][0]
     shown = penetrate_headline(result)
     assert any(verdict in text for text in shown.sentences)
-    assert "uppermost grains" in shown.rows[0][0] and "Terzaghi" in shown.rows[1][0]
+    assert "uppermost grains" in shown.rows[0][0] and "expected K" in shown.rows[1][0]
+    if verdict == "open":  # two branches: it is supported, or W / K at half and twice the expected K, 0.22 N/m
+        two = [load / (by * rest["stiffness"]) for by in (2.0, 0.5)]
+        assert rest["depth_least_cohesion"] == pytest.approx(two)
+        assert shown.rows[1][1].startswith("0, or 1.1") and "without cohesion" in rest["sentences"][0]
+        assert "robot lands" in rest["sentences"][0]
+    assert not any("(95 %; half" in text for text in rest["sentences"])
     assert verdict in summarise(read_folder(tmp_path / "run"))["answers"][0]["answer"]
 
 

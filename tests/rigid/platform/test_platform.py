@@ -186,8 +186,13 @@ def test_a_platform_there_is_not_is_refused_with_those_there_are():
         find_platform("nowhere.toml")
 
 
-def test_a_file_of_ones_own_is_read(tmp_path):
-    assert find_platform(write(tmp_path, ("mass = 5.3", "mass = 6.1"))).mass == 6.1
+def test_a_file_of_ones_own_is_read_and_goes_before_the_name_of_one_that_ships(tmp_path, monkeypatch):
+    path = write(tmp_path, ("mass = 5.3", "mass = 6.1"))
+    assert find_platform(path).mass == 6.1
+    monkeypatch.chdir(tmp_path)
+    assert find_platform("cube").mass == 0.1
+    path.rename("cube")
+    assert find_platform("cube").mass == 6.1
 
 
 def test_the_file_in_the_docs_is_a_platform(tmp_path):
