@@ -160,6 +160,10 @@ class Settled(dict[str, Number]):
                 self[key] = Number(row_of * fitted.values[key], _UNITS[key], of_row)
             else:
                 self.settle(key, getattr(material, key) / spikes_per_row, shared)
+            if not math.isfinite(self.value(key) * self.value(key)):
+                raise ValueError(
+                    f"{key} = {self.value(key):g} {_UNITS[key]}: its square is no finite number; expected below 1e154"
+                )
         if origin.startswith("surface ") and self["stiffness"].origin == shared:
             warnings += open_stiffness(material)
         self.settle("mu_s", material.mu_s, origin)

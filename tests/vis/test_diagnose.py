@@ -69,7 +69,7 @@ def test_what_replicates_differ_by_stands_beside_the_gap_and_behind_what_is_left
     write_folder(tmp_path, trials={"a": 3.0, "d": 2.0}, scatter=0.2)
     page = write_diagnosis_report(tmp_path).read_text(encoding="utf-8")
     for part in (
-        "after, with the scatter of replicates",
+        "after, held-out trials, with the scatter",
         "<td>1.5",
         "replicates&#39; scatter added",
         "Certain: nothing.",

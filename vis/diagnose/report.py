@@ -66,9 +66,13 @@ def answer_tiles(result: Result) -> list[Tile]:
     numbers = result["quantities"]
     part = "held_out" if numbers["gap_after_held_out"]["value"] is not None else "fit"
     which = say(f"gap_{part}")
-    tiles = [Tile(say(f"gap_{stage}"), _number(numbers[f"gap_{stage}_{part}"]["value"]), which) for stage in _STAGES]
+    where = say(f"gap_where_{part}")
+    tiles = [
+        Tile(say(f"gap_{stage}", where=where), _number(numbers[f"gap_{stage}_{part}"]["value"]), which)
+        for stage in _STAGES
+    ]
     if weighed := numbers.get(f"gap_with_scatter_after_{part}"):
-        tiles.append(Tile(say("gap_scatter"), quote(weighed["value"], weighed["std"]), which))
+        tiles.append(Tile(say("gap_scatter", where=where), quote(weighed["value"], weighed["std"]), which))
     fitted = [name for name in numbers if "." in name] + [name for name in numbers if name.endswith("_after")]
     tiles += [_tile_of(name, numbers[name]) for name in fitted]
     return tiles[:MOST_ROWS]

@@ -246,7 +246,8 @@ def _of_model(result: Entries) -> list[Tile]:
     """What was asked of the law of a model.toml: peaks of pushes, sinkages, K and C, beside the spring-damper's."""
     numbers = in_95(result)
     pushes = [name for name in numbers if name.startswith("peak_force_amended")]
-    pushes = [pushes[0], pushes[-1]] if len(pushes) > 1 else pushes
+    room = 3 if words.value_of(numbers, "sinkage_amended") is None else 2  # of six rows
+    pushes = pushes if len(pushes) <= room else [pushes[0], pushes[-1]]
     rows: list[tuple[str, str, str, str | None]] = [
         (
             f"Peak force{_without_beds(numbers[name])}, {_path(numbers[name])}",

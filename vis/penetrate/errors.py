@@ -55,7 +55,10 @@ def half_of(entry: Mapping[str, Any]) -> float | None:
 def error_words(result: Mapping[str, Any]) -> str:
     """What ± is in a result on the law of a model: half of a 95 % interval, with or without the scatter of beds."""
     peaks = [entry for name, entry in mapping_of(result.get("quantities")).items() if name.startswith("peak_force_am")]
-    return say("half_of_95_with_beds" if any(map(contains_beds, peaks)) else "half_of_95")
+    if not any(map(contains_beds, peaks)):
+        return say("half_of_95")
+    freedoms = [entry["freedom"] for entry in peaks if entry.get("freedom") is not None]
+    return say("half_of_95_with_beds", by=say("by_student", freedom=min(freedoms)) if freedoms else "")
 
 
 def contains_beds(entry: Any) -> bool:

@@ -26,7 +26,7 @@ from vis.penetrate.errors import error_words
 from vis.penetrate.plot_drag import Plot, drag_plot, gap_plot, work_plot
 from vis.penetrate.plot_drops import drop_peaks_plot, drops_plot, set_down_plot, spread_plot
 from vis.penetrate.summary import summarise
-from vis.penetrate.summary_parts import as_foot, mapping_of
+from vis.penetrate.summary_parts import as_foot, mapping_of, say
 from vis.pictures.pictures import Picture, Pictures, make_pictures
 from vis.view.page import report_scene
 
@@ -142,7 +142,24 @@ def _is_amended(run: RunFolder) -> bool:
 
 def _amended_plot(run: RunFolder) -> Plot | None:
     drawing = draw_amended(run)
-    return None if drawing is None else Plot.of("amended", drawing)
+    return None if drawing is None else Plot.of("amended", drawing, shown=_shown(run))
+
+
+def _on_law(run: RunFolder) -> tuple[list[Run], list[Run], list[Run]]:
+    """Pushes, drops and set-downs of which there is a motion on the law."""
+    alone = "ground_file" in run.result
+    driven, drops, stood = (
+        [r for r in run.of_kind(kind) if r.amended is not None or alone] for kind in ("driven", "drop", "set_down")
+    )
+    return driven, drops, stood
+
+
+def _shown(run: RunFolder) -> str:
+    """What the rows of `draw_amended` show."""
+    driven, drops, stood = _on_law(run)
+    if driven and (drops or stood):
+        return say("shown_both")
+    return say("shown_pushes" if driven else "shown_falls")
 
 
 def draw_amended(run: RunFolder, *, base: str = MODEL) -> Figure | None:
@@ -150,9 +167,7 @@ def draw_amended(run: RunFolder, *, base: str = MODEL) -> Figure | None:
 
     `base`: colour of the law without effects."""
     alone = "ground_file" in run.result
-    driven, drops, stood = (
-        [r for r in run.of_kind(kind) if r.amended is not None or alone] for kind in ("driven", "drop", "set_down")
-    )
+    driven, drops, stood = _on_law(run)
     groups = [_by_speed(driven), _by_speed(drops) + ([("set down", stood)] if stood else [])]
     groups = [group[:_MOST] for group in groups if group]
     if not groups:
@@ -176,10 +191,11 @@ def draw_amended(run: RunFolder, *, base: str = MODEL) -> Figure | None:
 @report_of(named=True)
 def _write_law_report(report: Report) -> Path:
     """Make figures/ and report.html of a run without a bed, and return the report."""
-    numbers, drawing = report.result["quantities"], draw_amended(read_folder(report.folder))
+    run = read_folder(report.folder)
+    numbers, drawing = report.result["quantities"], draw_amended(run)
     of_file = "ground_file" in report.result
     key = "law" if of_file else "amended"
-    blocks = [text("There is nothing to draw.")] if drawing is None else [report.draw(key, drawing)]
+    blocks = [text("There is nothing to draw.")] if drawing is None else [report.draw(key, drawing, shown=_shown(run))]
     rows = [
         (name.replace("_", " "), quote(entry["value"], entry["std"], entry["unit"]), str(entry.get("note", "")))
         for name, entry in numbers.items()

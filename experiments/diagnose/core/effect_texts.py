@@ -54,10 +54,10 @@ _BODY = {True: {"{one}": "the tip", "{body}": "tip"}, False: {"{one}": "one spik
 SYMBOLS = (
     "F is the force on the spike [N], z the depth and v the speed, downwards, z_m the deepest depth so far, "
     "r = z_m - z the way back, D the typical depth (`reference` in model.toml), H the height over which the tip "
-    "widens, K and C the stiffness and damping after the fit; an equation that begins with + or - is added to "
-    "F = K z + C max(v, 0), another one stands for K z; where several do, their factors of K z multiply, and what they "
-    "add to K z is added. K is F / z where the factor is 1: for a power of z / D alone at z = D, a secant and not the "
-    "stiffness at the surface"
+    "widens, K and C the stiffness and damping after the fit. F = f(z) + C max(v, 0), where f is K z, or an equation "
+    "in its place. Of several, the factors of K z multiply, and their terms add to it. An equation with 'on the way "
+    "back' stands for f(z) there. One that begins with + or - is added to F. K is f / z where the factor is 1: for a "
+    "power of z / D alone at z = D, a secant and not the stiffness at the surface"
 )
 """What the equations of penetration have in common."""
 

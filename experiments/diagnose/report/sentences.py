@@ -99,6 +99,12 @@ def _least(counted: Row) -> float:
     return 100 * float(beta.ppf(1 - _BOUND, right, named - right + 1))
 
 
+def _spread_words(kind: str, std: float) -> str:
+    """bed unloading by 2.2 %"""
+    unit = _SPREAD_UNITS.get(kind)
+    return f"{kind} by {100 * std:.2g} %" if unit is None else f"{kind} by {std:.2g} {unit}"
+
+
 _SPREAD_UNITS = {
     "force": "N, each in its own way", "depth": "m, each in its own way", "accel": "m/s2, each in its own way",
     "depth zero": "m", "force zero": "N",
@@ -107,11 +113,10 @@ _SPREAD_UNITS = {
 
 
 def spread_sentences(model_std: Mapping[str, float], *, granular: bool) -> list[str]:
-    """By what replicates differ beyond the sensors, in a sentence; of several kinds without sizes, which are guesses.
-    `model_std`: kind -> standard deviation;
-    `granular`: whether the ground is a bed of grains."""
+    """By what replicates differ beyond the sensors, in a sentence; of several kinds the sizes are guesses.
+    `model_std`: kind -> standard deviation; `granular`: whether the ground is a bed of grains."""
     if len(model_std) > 1:
-        return [say("spreads", kinds=" and ".join(model_std))]
+        return [say("spreads", kinds=" and ".join(map(_spread_words, model_std, model_std.values())))]
     whose = "the bed" if granular else "the surface, the rig or the start"
     return [
         say("spread", kind=kind, std=std, unit=_SPREAD_UNITS.get(kind, "(relative)"),

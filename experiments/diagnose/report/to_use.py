@@ -36,7 +36,12 @@ def use_sentences(diagnosis: Mapping[str, Any]) -> list[str]:
     meant = stiffness_words(diagnosis)
     secant = f" ({meant})" if meant else ""
     of_depth = "" if depth is None else say("of_depth")
-    sentence = say("use", numbers=", ".join(shown), secant=secant, beside=beside, each=each, of_depth=of_depth)
+    dampings = [entry for name, entry in after.items() if name.startswith("damping")]
+    known = len(stiffnesses) == len(dampings) == 1 and dampings[0]["std"] is not None
+    damping = f" and C = {number_words(dampings[0])}" if known else ""
+    sentence = say(
+        "use", numbers=", ".join(shown), secant=secant, damping=damping, beside=beside, each=each, of_depth=of_depth
+    )
     bounds = "".join(_bound(name, after[name]["at_most"]) for name in is_open[:_SHOWN] if "at_most" in after[name])
     covered = diagnosis.get("covered", {})
     no_way_out = "" if covered.get("withdrawal", True) else f" {say('no_withdrawal')}"

@@ -94,9 +94,7 @@ def push_damper(spring, crater_open):
     return factor
 
 
-_BACK = (
-    "at = (z - crater_share * z_m) / (1 - crater_share), on the way back, for K z and what changes it; never below 0"
-)
+_BACK = "at = (z - crater_share * z_m) / (1 - crater_share), on the way back; never below 0"
 
 
 def _form(
@@ -119,11 +117,11 @@ CANDIDATE = fit.Candidate(
     push=fit.Push(
         rank=40, law={"unload": push_unload, "damper": push_damper},
         forms=(
-            _form("crater", "crater_share", 0.5, 0.97, ((0.1,), (0.4,), (0.8,)), f"K * at, {_BACK}"),
+            _form("crater", "crater_share", 0.5, 0.97, ((0.1,), (0.4,), (0.8,)), f"f(at), {_BACK}"),
             _form("curved crater", "crater_share", 0.5, 0.97, ((0.1, 0.5), (0.4, 0.5), (0.7, 1.0), (0.7, 0.0)),
-                  f"K * at * (at / z_m)^crater_bend, {_BACK}", fit.between("crater_bend", "plain", 0.0, 2.5)),
+                  f"f(at) * (at / z_m)^crater_bend, {_BACK}", fit.between("crater_bend", "plain", 0.0, 2.5)),
             _form("stiffer unloading", "unload_stiffness", 5.0, 200.0, ((0.2,), (1.0,), (6.0,)),
-                  "K * z_m - K * (1 + unload_stiffness) * (z_m - z), on the way back; never below 0"),
+                  "f(z_m) - K * (1 + unload_stiffness) * (z_m - z), on the way back; never below 0"),
         ),
         bends=(
             fit.Bend("{}, empty", ("crater", "curved crater", "stiffer unloading"),

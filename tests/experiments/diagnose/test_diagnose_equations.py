@@ -48,13 +48,13 @@ def computed(numbers: dict[str, float], depth: np.ndarray, speed: np.ndarray) ->
     return push(table, np.zeros(1, dtype=np.int32), ends, depth, speed, times=times)[0]
 
 
-def told(form_id: str, numbers: dict[str, float], z: float, v: float, deepest: float) -> float:
-    """The same by the equation."""
+def told(form_id: str, numbers: dict[str, float], z: float, v: float, deepest: float, loading=None) -> float:
+    """The same by the equation; `loading`: force of the way down over depth, K z if not given."""
     text = PENETRATION[form_id]
     first, *clauses = re.split(r", (?![^(]*\))", text)  # not within parentheses
     names = numbers | {
         "K": K, "D": D, "H": H, "z": z, "v": v, "z_m": deepest, "r": deepest - z, "exp": math.exp, "min": min,
-        "max": max, "abs": abs, "sign": np.sign, "tanh": math.tanh,
+        "max": max, "abs": abs, "sign": np.sign, "tanh": math.tanh, "f": loading or (lambda depth: K * depth),
     }  # fmt: skip
     if form_id.startswith("shaft-friction:mobilised over a way"):  # dw = (sign(dz) - w) |dz| / reach, solved
         reach = numbers["shaft_reach"]
@@ -99,6 +99,22 @@ def test_the_equation_of_a_push_is_what_is_computed(form_id):
         else:
             assert force[row] == pytest.approx(told(form_id, numbers, z, v, deepest), rel=2e-3, abs=1e-6)
             assert abs(force[row] - K * z - C * max(v, 0.0)) > 0 or form_id.startswith("layering")
+
+
+@pytest.mark.parametrize("unloading", ["stiffer unloading", "crater", "curved crater"])
+def test_beside_hardening_the_equation_of_the_way_back_starts_from_the_hardened_force(unloading):
+    hardening, sinking = "depth-hardening:quadratic", f"plastic-sinkage:{unloading}"
+    hard, soft = numbers_of(FORMS[hardening]), numbers_of(FORMS[sinking])
+    depth = np.concatenate([np.linspace(1e-6, DEEPEST, 2001), np.linspace(DEEPEST, 0.012, 801)[1:]])
+    speed = np.where(np.arange(len(depth)) <= 2000, SPEED, -0.4 * SPEED)
+    force = computed(hard | soft, depth, speed)
+
+    def loading(z):
+        return told(hardening, hard, z, 0.0, z)
+
+    for row in (2020, 2250):
+        z = float(depth[row])
+        assert force[row] == pytest.approx(told(sinking, soft, z, float(speed[row]), DEEPEST, loading), rel=2e-3)
 
 
 def test_every_form_has_an_equation_in_the_names_of_its_parameters():

@@ -48,7 +48,7 @@ def test_k_is_in_each_form_what_is_said_beside_it(effect, form):
 def test_what_k_is_has_the_words_of_each_form():
     power = {"equation": "K * z * (z / D)^hardening_power", "stiffness": "F / z at z = D"}
     layer = {"equation": "K * z * (1 + layer_factor * inside)", "stiffness": "above the layer"}
-    sinks = {"equation": "K * z_m - K * (1 + unload_stiffness) * (z_m - z)"}
+    sinks = {"equation": "f(z_m) - K * (1 + unload_stiffness) * (z_m - z)"}
     said = stiffness_words({"equations": [power, layer, sinks], "typical_depth_m": 0.0075})
     assert said.startswith("F / z") and "D = 7.5" in said and said.endswith("above the layer")
     assert stiffness_words({"equations": [sinks]}) == ""
