@@ -71,8 +71,8 @@ class CandidateFits:
         self.table.append(Hypothesis.of(found))
         return self.table[-1]
 
-    def _try(self, start: Hypothesis, forms: Sequence[Form]) -> list[Hypothesis]:
-        """`start` with each of `forms` added, all refitted."""
+    def _try(self, start: Hypothesis, forms: Sequence[Form], *, most: int | None = None) -> list[Hypothesis]:
+        """`start` with each of `forms` added, all refitted; `most`: only so many, those that leave least when begun."""
         fresh = [form for form in forms if form.id not in self._alone]
         found = dict(zip([f.id for f in fresh], best_starts(start.fit.model, fresh, start.fit.values), strict=True))
         begun: list[tuple[Form, Model, Values]] = []
@@ -84,10 +84,11 @@ class CandidateFits:
         for (form, _, _), one in zip(begun, fit_each([(m, v) for _, m, v in begun], rounds=4), strict=True):
             if form.id not in short or one.objective < short[form.id].objective:
                 short[form.id] = one
-        found |= dict(zip(short, fit_each([(one.model, one.values) for one in short.values()]), strict=True))
+        kept = sorted(short, key=lambda id: short[id].objective)[:most]
+        found |= dict(zip(kept, fit_each([(short[id].model, short[id].values) for id in kept]), strict=True))
         if not start.forms:
             self._alone |= found
-        return [self._kept(found[form.id]) for form in forms]
+        return [self._kept(found[form.id]) for form in forms if form.id in found]
 
     def _places(self, start: Hypothesis, form: Form) -> list[Values]:
         """Where a form may begin beside others: where it stood alone, and from a small amplitude."""
@@ -229,7 +230,7 @@ class CandidateFits:
                 form for form in start.fit.model.problem.forms
                 if form.effect in start.effects and not any(p.name in taken for p in form.parameters)
             ]  # fmt: skip
-            for made in self._try(start, others):
+            for made in self._try(start, others, most=_FINISHED):
                 if made.score > best.score + 1.0:
                     best = made
             if best is start:
