@@ -17,7 +17,7 @@ from . import say
 from .settings import RobotSettings
 
 __all__ = [
-    "APART", "Flights", "at_end", "at_rest", "fall_warning", "find_flights", "launched", "pushes_off", "rising",
+    "APART", "REST", "Flights", "at_end", "at_rest", "fall_warning", "find_flights", "launched", "pushes_off", "rising",
     "to_landing", "touch_words",
 ]  # fmt: skip
 

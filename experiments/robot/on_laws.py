@@ -8,7 +8,7 @@ the duration. In flight MuJoCo continues it without the ground (`experiments.rob
 from coupling.robot import RobotRun
 
 from .feet import feet_reached, heights_of
-from .flight import at_rest, find_flights, rising
+from .flight import REST, at_rest, find_flights, rising
 from .forms import OnLaw
 from .result import quantities_of
 from .sure import answer_of
@@ -25,7 +25,7 @@ def answer_of_run(run: RobotRun) -> dict[str, float]:
 
 
 def follow_on(run: RobotRun) -> None:
-    """Step a run on a law to its end, and on by parts of its duration until the robot is in flight or at rest.
+    """Step a run on a law to its end, and on by parts of its duration until the robot flies, has hopped or is at rest.
 
     At most to `LONGEST` durations. A controller that fails after the duration ends it at the part before.
     """
@@ -53,10 +53,13 @@ def on_law(run: RobotRun) -> OnLaw:
 
 
 def _finished(run: RobotRun, part: float) -> bool:
-    """Whether a longer run has nothing to add; so it is where nothing touches, and where nothing falls.
+    """Whether the rise is known: in flight, at rest, or after a hop, unless the robot pushes off higher. So it is where
+    nothing touches, and where nothing falls.
 
     ``part``: time for which a robot at rest has not moved [s].
     """
-    if run.robot.hangs or not run.robot.gravity > 0 or not run.columns["touching"].any():
+    if run.robot.hangs or not run.robot.gravity > 0 or not run.columns["touching"].any() or at_rest(run, part):
         return True
-    return at_rest(run, part) or find_flights(run, heights_of(run)).at_end
+    flights = find_flights(run, heights_of(run))
+    since = run.columns["z"][flights.touched :]
+    return flights.at_end or (since.max() > since[0] + REST and not rising(run, flights))

@@ -35,8 +35,8 @@ _QUICK_START = 1.0  # A stage that reports its first share sooner has gone on fr
 _GUESSED = 15.0  # A first guess of the rate weighs as much as so much work done [s]
 _MOST_SLOWER = 3.0  # Most by which the machine's pace scales times that are known in seconds [1]
 _SLOWEST = 3e4
-"""Grain-steps in a second of a bed below which kernels are still being compiled [1/s], if it is also less than a step in two
-seconds of all that are awake: a bed on a busy core does 1e6."""
+"""Grain-steps in a second of a bed below which kernels are still being compiled [1/s], if all that are awake also make
+less than a step in two seconds. A bed on a busy core does 1e6."""
 _RECENT = 10.0  # A bed's rate is that of so long before now [s]
 _LATE = 0.15  # What a stage that is late is said to take yet, over how late it is [1]
 

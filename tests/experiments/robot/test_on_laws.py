@@ -64,6 +64,14 @@ def test_a_robot_that_has_landed_is_followed_until_it_is_at_rest_and_one_that_fa
     assert not on_law(falling).rising and not on_law(down).rising
 
 
+def test_a_robot_that_has_hopped_is_not_followed_into_its_next_push():
+    """The second push of the leg begins at 0.75 s."""
+    run = run_of(plan_robot(RobotSettings(**HOPPER, duration=0.8)))
+    follow_on(run)
+    assert run.time == pytest.approx(0.8, abs=1e-3) and not on_law(run).rising
+    assert answer_of_run(run)["highest"] > 0.03
+
+
 def test_a_controller_that_knows_the_duration_alone_ends_the_law_there(planned):
     def fails(_, data):
         if data.time > 0.086:
