@@ -115,8 +115,8 @@ def at_rest(run: RobotRun, seconds: float) -> bool:
 def rising(run: RobotRun, flights: Flights) -> bool:
     """Whether a run ends while the robot pushes off: on its way up, not yet in a flight.
 
-    Its speed alone would take the centre of mass above all heights so far; or it is on its first way up, so that what
-    ground and joints still add is not known. A swing in the ground that decays does not push off.
+    Its speed alone would take the centre of mass above all heights so far. Or it is on its first way up: what ground
+    and joints still add is not known. A swing in the ground that decays does not push off.
     """
     gravity = run.robot.gravity
     if flights.touched is None or flights.at_end or run.robot.hangs or not gravity > 0:

@@ -80,8 +80,8 @@ def forms_of(plan: RobotPlan, own: OnLaw, follow: Callable[[RobotPlan], OnLaw], 
     """The answer on the law of a run and on the others.
 
     ``own``: the run. ``follow``: runs the robot of a plan, for long enough. ``sure``: the ranges of the run's own law,
-    which those over the laws include. A law on which the robot cannot run is named and left out, and so is one where it
-    is on its way up at the end. Where it is so in the run itself, its law runs again, for long enough.
+    which those over the laws include. A law on which the robot cannot run is named and left out. So is one where it is
+    on its way up at the end. Where it is so in the run itself, its law runs again, for long enough.
     """
     s, others = plan.settings, other_laws(plan)
     here = _named(plan.law, s.ground_parameters)

@@ -1,8 +1,8 @@
 """How long a robot is followed on a surface law: until it has left the ground, or is at rest.
 
-A push that launches the robot from grains may leave it in its crater on a softer law at the end of the run, still on
-its way up. Its rise would then be that of the crater. A law costs little, so that the robot goes on there by parts of
-the duration. In flight MuJoCo continues it without the ground (`experiments.robot.flight`).
+A push may launch the robot from grains. On a softer law it may then be in its crater still at the end of the run, on
+its way up. Its rise would be that of the crater. A law costs little, so that the robot goes on there by parts of the
+duration. In flight MuJoCo continues it without the ground (`experiments.robot.flight`).
 """
 
 from coupling.robot import RobotRun
@@ -25,9 +25,9 @@ def answer_of_run(run: RobotRun) -> dict[str, float]:
 
 
 def follow_on(run: RobotRun) -> None:
-    """Step a run on a law to its end, and on by parts of its duration until the robot flies, has hopped or is at rest.
+    """Step a run on a law to its end, and on until the robot flies, has hopped or is at rest.
 
-    At most to `LONGEST` durations. A controller that fails after the duration ends it at the part before.
+    It goes on by parts of the duration, to `LONGEST` of it at most. A controller that fails after the duration ends it at the part before.
     """
     part = run.duration / PARTS
     run.run()
