@@ -27,7 +27,8 @@ def answer_of_run(run: RobotRun) -> dict[str, float]:
 def follow_on(run: RobotRun) -> None:
     """Step a run on a law to its end, and on until the robot flies, has hopped or is at rest.
 
-    It goes on by parts of the duration, to `LONGEST` of it at most. A controller that fails after the duration ends it at the part before.
+    It goes on by parts of the duration, to `LONGEST` of it at most. A controller that fails after the duration ends it
+    at the part before.
     """
     part = run.duration / PARTS
     run.run()
