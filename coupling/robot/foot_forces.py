@@ -7,7 +7,6 @@ a foot at rest on a slope creeps. What it computes is therefore not the bits of 
 
 import copy
 import math
-import warnings
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
@@ -17,7 +16,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from rigid.checks import check_above_zero
+from rigid.checks import check_above_zero, warn_user
 from rigid.ground.laws import SurfaceLaw, find_law
 from rigid.ground.soles import of_one_foot
 from rigid.ground.specialised import written
@@ -191,10 +190,9 @@ class FootForces(AbstractContextManager["FootForces"]):
         if self._warned:
             return
         self._warned = True
-        warnings.warn(
+        warn_user(
             f"foot {name!r} goes {1e3 * depth:.3g} mm deep, and the parameters of its law hold to "
-            f"{1e3 * limit:.3g} mm: the force is extrapolated",
-            stacklevel=3,
+            f"{1e3 * limit:.3g} mm: the force is extrapolated"
         )
 
     def _warn_fast(self, speed: float, name: str, fastest: float) -> None:
@@ -202,10 +200,9 @@ class FootForces(AbstractContextManager["FootForces"]):
         if self._warned_fast:
             return
         self._warned_fast = True
-        warnings.warn(
+        warn_user(
             f"foot {name!r} goes into the ground at {speed:.3g} m/s, and laws of sand were compared with grains up to "
-            f"{fastest:.3g} m/s ({FASTEST} sqrt(g D)): faster, grains push harder, and a launch is faster",
-            stacklevel=3,
+            f"{fastest:.3g} m/s ({FASTEST} sqrt(g D)): faster, grains push harder, and a launch is faster"
         )
 
 

@@ -111,6 +111,7 @@ def over_beds(seeds: Sequence[int], results: Sequence[Mapping[str, Any]]) -> Res
         **({"ballistic": True} if any(set(BALLISTIC.values()) & set(one["quantities"]) for one in results) else {}),
         **{name: first[name] for name in OF_ALL},
         **({"forms": forms.numbers} if forms.numbers else {}),
+        **({"start_height": first["start_height"]} if "start_height" in first else {}),
         feet_reached=_mean_reached(results),
         beds=[
             {"seed": seed, "folder": f"beds/seed-{seed}", "answer": answer, "grains": _of_its_own(result)}

@@ -16,9 +16,13 @@ from experiments.grains.spells import spells
 from . import say
 from .settings import RobotSettings
 
-__all__ = ["APART", "Flights", "at_end", "fall_warning", "find_flights", "launched", "to_landing", "touch_words"]
+__all__ = [
+    "APART", "REST", "Flights", "at_end", "at_rest", "fall_warning", "find_flights", "launched", "pushes_off", "rising",
+    "to_landing", "touch_words",
+]  # fmt: skip
 
 APART = 5e-3  # A flight lasts at least that long [s]
+REST = 1e-3  # Rise that the speed of a robot at rest could still give its centre of mass [m]
 IN_CRATER = 1e-3  # Depth of the lowest foot from which on a launch is said to be in its crater [m]
 
 Array = NDArray[np.float64]
@@ -100,6 +104,38 @@ def at_end(run: RobotRun, heights: Array) -> tuple[float, float, float] | None:
         return rise, speed, fall
     fall = _fall(max(0.0, float(heights[-1].min())), speed, gravity)
     return max(0.0, speed) ** 2 / (2 * gravity), speed, fall
+
+
+def at_rest(run: RobotRun, seconds: float) -> bool:
+    """Whether the centre of mass moved neither up nor down in the last `seconds`, within what rises by `REST`."""
+    count = max(2, round(seconds / run.macro_step))
+    return bool(np.abs(_upwards(run)[-count:]).max() <= _slow(run))
+
+
+def rising(run: RobotRun, flights: Flights) -> bool:
+    """Whether a run ends while the robot pushes off: on its way up, not yet in a flight.
+
+    Its speed alone would take the centre of mass above all heights so far. Or it is on its first way up: what ground
+    and joints still add is not known. A swing in the ground that decays does not push off.
+    """
+    gravity = run.robot.gravity
+    if flights.touched is None or flights.at_end or run.robot.hangs or not gravity > 0:
+        return False
+    z, speeds = run.columns["z"][flights.touched :], _upwards(run)[flights.touched :]
+    if speeds[-1] <= _slow(run):
+        return False
+    first = int(np.argmax(speeds > _slow(run)))
+    return bool(speeds[first:].min() >= -_slow(run) or z[-1] + speeds[-1] ** 2 / (2 * gravity) > z.max() + REST)
+
+
+def pushes_off(run: RobotRun, flights: Flights) -> str | None:
+    """The warning of a run that ends while the robot is `rising`; None of another."""
+    return say("pushes_off", speed=float(_upwards(run)[-1])) if rising(run, flights) else None
+
+
+def _slow(run: RobotRun) -> float:
+    """Speed that rises by `REST` [m/s]."""
+    return math.sqrt(2 * run.robot.gravity * REST)
 
 
 def fall_warning(settings: RobotSettings, robot: MujocoRobot) -> list[str]:

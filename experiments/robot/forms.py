@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from experiments.runs.types import Json
-from vis.page.numbers import between, foldable, quantity
+from vis.page.numbers import between, foldable, in_one_unit
 
 from . import say
 from .laws import given_parameters
@@ -17,7 +17,7 @@ from .plan import RobotPlan, plan_robot
 from .settings import DEFAULT
 from .sure import ANSWER, Answer, entry
 
-__all__ = ["MOST_INERTIA", "NO_FORMS", "Forms", "expected_words", "forms_of", "other_laws", "with_grains"]
+__all__ = ["MOST_INERTIA", "NO_FORMS", "Forms", "OnLaw", "expected_words", "forms_of", "other_laws", "with_grains"]
 
 MOST_INERTIA = "inertia=10"
 """The largest inertia of `rft`, beside its default of plates (rigid/ground/rft.py)."""
@@ -30,6 +30,15 @@ LAWS: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("power-irreversible", ()), ("katsuragi-durian", ()), ("bekker", ()),
 )  # fmt: skip
 """Laws that have numbers for sand, with their parameters."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class OnLaw:
+    """A robot on one law."""
+
+    answer: Answer
+    time: float  # Simulated [s]
+    rising: bool = False  # Whether it ends on its way up, before it flies: its rise is not known
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,74 +76,84 @@ def other_laws(plan: RobotPlan) -> dict[str, RobotPlan]:
     return found
 
 
-def forms_of(
-    plan: RobotPlan, best: Answer, follow: Callable[[RobotPlan], Answer], *, sure: Mapping[str, Json]
-) -> Forms:
+def forms_of(plan: RobotPlan, own: OnLaw, follow: Callable[[RobotPlan], OnLaw], *, sure: Mapping[str, Json]) -> Forms:
     """The answer on the law of a run and on the others.
 
-    ``best``: answer of the run. ``follow``: runs the robot of a plan and returns its answer. ``sure``: the ranges of
-    the run's own law, which those over the laws include. A law on which the robot cannot run is named and left out.
+    ``own``: the run. ``follow``: runs the robot of a plan, for long enough. ``sure``: the ranges of the run's own law,
+    which those over the laws include. A law on which the robot cannot run is named and left out. So is one where it is
+    on its way up at the end. Where it is so in the run itself, its law runs again, for long enough.
     """
-    answers, lost = {_named(plan.law, plan.settings.ground_parameters): best}, []
-    for name, other in other_laws(plan).items():
+    s, others = plan.settings, other_laws(plan)
+    here = _named(plan.law, s.ground_parameters)
+    if others and own.rising and own.time < 1.01 * s.duration:
+        others = {here: plan, **others}
+    runs, lost = {here: own}, []
+    for name, other in others.items():
         try:
-            answers[name] = follow(other)
+            runs[name] = follow(other)
         except (RuntimeError, ValueError):  # lost, or an exchange that would be unstable
             lost.append(name)
-    if len(answers) == 1:
+    if len(runs) == 1:
         return NO_FORMS
-    ends = [{name: one[end] for name, one in sure.items()} for end in ("low", "high")]
-    forms = _ranges(answers, best, ends, on_grains=False, duration=plan.settings.duration)
-    words = [foldable(say("forms_lost", laws=", ".join(lost)))] if lost else []
-    return replace(forms, words=(*forms.words, *words))
+    numbers: Json = {
+        "laws": {name: one.answer for name, one in runs.items() if not one.rising}, "duration": s.duration,
+        "longest": max(one.time for one in runs.values()), "lost": lost,
+        "rising": [name for name, one in runs.items() if one.rising],
+    }  # fmt: skip
+    ends = [] if own.rising else [{name: one[end] for name, one in sure.items()} for end in ("low", "high")]
+    return _ranges(numbers, own.answer, ends, on_grains=False)
 
 
 def with_grains(laws: Forms, best: Answer) -> Forms:
-    """The ranges over `laws`, widened to a run on grains with the answer `best`; nothing where there are no laws."""
-    if not laws.numbers:
-        return NO_FORMS
-    return _ranges(laws.numbers["laws"], best, [best], on_grains=True, duration=laws.numbers.get("duration"))
+    """The ranges over `laws`, widened to a run on grains with the answer `best`; as they are where there are none."""
+    return _ranges(laws.numbers, best, [best], on_grains=True) if laws.numbers else laws
 
 
-def _ranges(
-    answers: Mapping[str, Answer], best: Answer, more: Sequence[Answer], *, on_grains: bool, duration: float | None
-) -> Forms:
-    """The ranges over `answers` and `more`, around the answer `best` of the run.
+def _ranges(numbers: Json, best: Answer, more: Sequence[Answer], *, on_grains: bool) -> Forms:
+    """The ranges over the answers of ``laws`` in `numbers` and `more`, around the answer `best` of the run.
 
-    ``duration``: of each run [s]; None where an older hedgebed has made it.
+    Where the robot is on its way up at the end on all of them there are none.
     """
+    answers = numbers["laws"]
+    if not answers:
+        return Forms(words=tuple(map(foldable, _left_out(numbers))))
     ranges = {}
     for name in ANSWER:
         values = [answer[name] for answer in (*answers.values(), *more) if name in answer]
         ranges[name] = entry(name, best[name], min(values), max(values))
-    numbers: Json = {"laws": answers, "ranges": ranges, "duration": duration}
+    numbers = {**numbers, "ranges": ranges}
     words = expected_words(numbers, best, on_grains=on_grains)
     return Forms(numbers=numbers, words=tuple(map(foldable, words)))
 
 
 def expected_words(numbers: Json, best: Answer, *, on_grains: bool) -> list[str]:
-    """Rise or sinkage on each law, and on which side real sand is expected, in sentences.
+    """On which side real sand is expected, and rise or sinkage on each law, in sentences.
 
     ``numbers``: as of `Forms`. ``best``: answer of the run, on grains (`on_grains`) or on a law.
     """
     answers, ranges = numbers["laws"], numbers["ranges"]
     told = "highest" if best["longest_flight"] > 0 else "sinkage_largest"
     unit, one = ANSWER[told], ranges[told]
-    ends = between(one["low"], one["high"], unit)
-
-    def shown(answer: Answer) -> str:
-        return quantity({"value": answer[told], "std": None, "unit": unit})
-
-    each = "; ".join(f"{law} {shown(answer)}" for law, answer in answers.items())
+    shown = in_one_unit([answer[told] for answer in answers.values()], unit, widest=(one["low"], one["high"]))
+    each = "; ".join(f"{law} {number}" for law, number in zip(answers, shown, strict=True))
+    words = {"what": say(f"called_{told}"), "ends": between(one["low"], one["high"], unit), "each": each}
     near = next((law for law in (_named(DEFAULT, (DROPPED_INERTIA,)), DEFAULT) if law in answers), None)
-    words = {"what": say(f"called_{told}"), "ends": ends, "each": each}
-    said = [say("forms_with_grains" if on_grains else "forms_of_laws", **words)]
+    said = [say("forms_with_grains" if on_grains else "forms_of_laws", **words), *_left_out(numbers)]
     if near is not None:
-        key = "expected_of_grains" if on_grains else "expected_of_laws"
-        said.insert(0, say(key, what=words["what"], law=near, low=shown(answers[near]), high=shown(best)))
-    if numbers.get("duration") and any(answer["longest_flight"] > 0 for answer in (best, *answers.values())):
-        said.append(say("forms_until", duration=numbers["duration"]))
+        said.append(say("expected_of_grains" if on_grains else "expected_of_laws", law=near))
+    duration = numbers.get("duration")
+    if duration and any(answer["longest_flight"] > 0 for answer in (best, *answers.values())):
+        longest = numbers.get("longest", duration)
+        more = say("forms_longer", longest=longest) if longest > 1.01 * duration else ""
+        said.append(say("forms_until", duration=duration, more=more))
     return said
+
+
+def _left_out(numbers: Json) -> list[str]:
+    """Which laws are not in the ranges, and why, in sentences."""
+    lost, up = (", ".join(numbers.get(key, ())) for key in ("lost", "rising"))
+    on_the_way = [say("forms_rising", laws=up, longest=numbers["longest"])] if up else []
+    return [*on_the_way, *([say("forms_lost", laws=lost)] if lost else [])]
 
 
 def _named(law: str, parameters: tuple[str, ...]) -> str:

@@ -34,13 +34,13 @@ from rigid.spatial.quaternions import to_matrix
 
 from . import say
 from .energy import idle
-from .feet import feet_reached, heights_of
-from .flight import fall_warning, find_flights, touch_words
-from .forms import MOST_INERTIA, NO_FORMS, Forms, forms_of, with_grains
+from .flight import fall_warning, touch_words
+from .forms import MOST_INERTIA, NO_FORMS, Forms, OnLaw, forms_of, with_grains
+from .on_laws import answer_of_run, follow_on, on_law
 from .plan import RobotPlan, width_of
-from .result import RobotFrames, conclude, deepest_at_start, quantities_of, write_series_of
+from .result import RobotFrames, conclude, deepest_at_start, write_series_of
 from .settings import RobotSettings
-from .sure import answer_of, sure_of_law
+from .sure import sure_of_law
 
 __all__ = ["RobotFollowed", "RobotForecast", "RobotOnBed", "report_seconds"]
 
@@ -99,22 +99,22 @@ class RobotFollowed(Followed[RobotRun]):
         return f"note: {say('idle_so_far', time=run.time)}" if idle(self.plan, run) else None
 
     def conclude(self, run: RobotRun, folder: Path) -> Result:
-        best = _answer(run)
-        sure, said = sure_of_law(self.plan, best, self._answer_of)
-        forms = forms_of(self.plan, best, self._answer_of, sure=sure)
+        own = on_law(run)
+        sure, said = sure_of_law(self.plan, own.answer, self._answer_of)
+        forms = forms_of(self.plan, own, self._long_enough, sure=sure)
         return conclude(self.settings, self.plan, run, folder, sure=sure, sure_words=said, forms=forms)
 
     def _answer_of(self, plan: RobotPlan) -> dict[str, float]:
         """The answer of the same robot on the law of another plan."""
         run = RobotFollowed(plan.settings, plan).run_on_law()
         run.run()
-        return _answer(run)
+        return answer_of_run(run)
 
-
-def _answer(run: RobotRun) -> dict[str, float]:
-    """The answer of a run."""
-    heights = heights_of(run)
-    return answer_of(quantities_of(run, heights, find_flights(run, heights)), feet_reached(run, heights))
+    def _long_enough(self, plan: RobotPlan) -> OnLaw:
+        """The same until the robot is in flight or at rest."""
+        run = RobotFollowed(plan.settings, plan).run_on_law()
+        follow_on(run)
+        return on_law(run)
 
 
 def _stepping(settings: RobotSettings) -> Mapping[str, Any]:
@@ -193,17 +193,19 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
 
     @cached_property
     def beside(self) -> RobotRun:
-        """The same robot on the default law of the surface, to compare with.
+        """The same robot on the default law of the surface, to compare with, until it is in flight or at rest.
 
         Size and modulus of the bed follow from the spring-damper nevertheless: a flat foot goes deeper on it.
         """
         law = self.settings.default_law
         if law == "spring-damper":
-            return self.forecast.run
+            run = self.forecast.run
+            follow_on(run)
+            return run
         plan = self.plan.on_law(law)
         robot = plan.robot()
         run = RobotRun(robot, plan.law_feet(robot), duration=self.duration, **_stepping(self.settings))
-        run.run()
+        follow_on(run)
         return run
 
     @cached_property
@@ -430,10 +432,10 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
         law = self.settings.default_law
         if law == "spring-damper":
             return NO_FORMS
-        return forms_of(self.plan.on_law(law), _answer(self.beside), self._answer_of, sure={})
+        return forms_of(self.plan.on_law(law), on_law(self.beside), self._long_enough, sure={})
 
     def conclude(self, run: RobotRun, folder: Path) -> Result:
         return conclude(
             self.settings, self.told, run, folder, beside=self.beside, softening=self.softening(),
-            across=self.narrowest / self.settings.grain, forms=with_grains(self.forms, _answer(run)),
+            across=self.narrowest / self.settings.grain, forms=with_grains(self.forms, answer_of_run(run)),
         )  # fmt: skip

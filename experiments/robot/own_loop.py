@@ -21,7 +21,7 @@ class LawOfRun:
     law: FeetLaw | OneLaw  # Arguments of `FootForces` and `LawFeet`
     mu_s: float  # Friction of sticking [1]
     mu_d: float  # Friction of sliding [1]
-    notes: tuple[str, ...]  # What a run says of it: each number that was not given, and the warnings
+    notes: tuple[str, ...]  # The warnings, then the law and each of its numbers
 
 
 def law_of_run(model: Any, feet: Sequence[str], **settings: Any) -> LawOfRun:
@@ -37,4 +37,4 @@ def law_of_run(model: Any, feet: Sequence[str], **settings: Any) -> LawOfRun:
     plan = plan_robot(own, model=model)
     law = plan.feet_options(plan.robot())
     mu_s, mu_d = (plan.numbers[name].value for name in ("mu_s", "mu_d"))
-    return LawOfRun(law=law, mu_s=mu_s, mu_d=mu_d, notes=tuple(plan.announcement()))
+    return LawOfRun(law=law, mu_s=mu_s, mu_d=mu_d, notes=tuple(plan.notes_of_loop()))

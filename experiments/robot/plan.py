@@ -69,6 +69,7 @@ class RobotPlan:
     fitted: GroundFile | None  # The file that the law comes from
     rule: GravityRule  # How K and C of the surface follow gravity
     warnings: tuple[str, ...]
+    floors: tuple[str, ...] = ()  # Names of MuJoCo's own floors, which a run switches off
     notes: tuple[str, ...] = ()  # What a person is to know and no warning is
 
     def robot(self) -> MujocoRobot:
@@ -115,19 +116,36 @@ class RobotPlan:
 
     def announcement(self) -> list[str]:
         """What was not given, then the warnings."""
-        chosen = [] if "ground" in self.settings.model_fields_set else [say("default_law", law=self.law)]
+        return [*self._chosen, *self.in_words(), *self.notes, *(f"warning: {warning}" for warning in self.warnings)]
+
+    @property
+    def _chosen(self) -> list[str]:
+        """The law, where it was not given."""
+        return [] if "ground" in self.settings.model_fields_set else [say("default_law", law=self.law)]
+
+    def in_words(self, *, given: bool = False) -> list[str]:
+        """Each number with its meaning and origin, in a line; those that are `given` too, where they are wanted."""
         means = {parameter.name: parameter.summary for parameter in find_law(self.law).parameters}
         means.pop("gravity", None)  # the robot's too: its origin says enough
         means |= {name: say(f"means_{name}") for name in OF_LAW if name.startswith("mu_")}
         told = []
         for name, number in self.numbers.items():
-            if number.origin == "given":
+            if number.origin == "given" and not given:
                 continue
             of_law = self.settings.on_grains and name in OF_LAW
             words = "; ".join(part for part in (means.get(name), number.origin) if part)
             unit = "" if number.unit == "1" else f" {number.unit}"
             told.append(f"{name} = {number.value:.6g}{unit} ({words}{say('of_forecast') if of_law else ''})")
-        return [*chosen, *told, *self.notes, *(f"warning: {warning}" for warning in self.warnings)]
+        return told
+
+    def notes_of_loop(self) -> list[str]:
+        """What a loop of one's own is to know: first the warnings, then law and all numbers.
+
+        A floor of the model is on there, unless the loop switches it off.
+        """
+        off = say("floors_off", floors=", ".join(self.floors))
+        found = [say("floors_on", floors=", ".join(self.floors)) if one == off else one for one in self.warnings]
+        return [*(f"warning: {one}" for one in found), *self._chosen, *self.notes, *self.in_words(given=True)]
 
 
 def keep_files(settings: RobotSettings, folder: Path) -> None:
@@ -200,7 +218,7 @@ def plan_robot(settings: RobotSettings, *, folder: Path | None = None, model: An
     return RobotPlan(
         settings=settings, model=model, controller=_controller(settings, folder), surface=surface, numbers=numbers,
         scales=scales, diameters=diameters, fitted=fitted, rule=rule, warnings=tuple(warnings),
-        notes=tuple(law_notes(settings, surface)),
+        floors=robot.floors, notes=tuple(law_notes(settings, surface)),
     )  # fmt: skip
 
 

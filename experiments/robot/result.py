@@ -32,7 +32,7 @@ from .feet import (
     too_deep,
     too_fast,
 )
-from .flight import APART, Flights, at_end, find_flights, launched, to_landing
+from .flight import APART, Flights, at_end, find_flights, launched, pushes_off, to_landing
 from .forms import NO_FORMS, Forms
 from .laws import of_sand
 from .plan import RobotPlan
@@ -41,6 +41,7 @@ from .settings import RobotSettings
 __all__ = ["RobotFrames", "conclude", "deepest_at_start", "write_series_of"]
 
 BELOW = 1e-3  # What is no foot and goes deeper than this is worth a warning [m]
+LIFTED = 0.1  # Height of the lowest foot above which a start is said to be above the surface [mm]
 UNITS = {
     "time": "t_s", "x": "x_m", "y": "y_m", "z": "z_m", "kinetic_energy": "kinetic_J", "potential_energy": "potential_J",
     "torque_work": "torque_work_J", "actuator_work": "actuator_work_J", "given": "given_J", "taken": "taken_J",
@@ -181,7 +182,7 @@ def conclude(
         say("unstable", load=run.load, most=run.most_load) if run.load > run.most_load else None,
         say("went_below", name=run.lowest_other[1], depth=-1e3 * run.lowest_other[0])
         if run.lowest_other[0] < -BELOW else None,
-        _cut_off(run, heights, flights) if flights.at_end else None,
+        _cut_off(run, heights, flights) if flights.at_end else None, pushes_off(run, flights),
         *bounce_warning(run, crater_losses(run, heights, apart=APART), plan.law),
         *(too_deep(run, plan.law) if plan.fitted is None else []),
         *([] if settings.on_grains else too_fast(plan, run, heights, forms.numbers.get("laws", ()))),
@@ -196,13 +197,15 @@ def conclude(
         "duration": settings.duration,
         **({"sure": sure} if sure else {}), **({"forms": forms.numbers} if forms.numbers else {}),
         "feet": [foot.name for foot in robot.feet], "feet_reached": feet_reached(run, heights),
+        "start_height": float(heights[0].min()),
         "warnings": warnings, "macro_step": run.macro_step, "robot_step": robot.step, "steps": run.master.count,
     }  # fmt: skip
     if softening is not None and beside is not None and isinstance(run.ground, BedFeet):
         rows, lifted = beside.columns, heights_of(beside)
+        count = int(np.searchsorted(rows["time"], run.time + 0.5 * beside.macro_step))  # of the time on grains
         write_series(
             folder / "series" / f"{settings.default_law}.csv",
-            {UNITS[name]: rows[name] for name in ("time", "x", "y", "z", "touching", "fz", "sinkage")},
+            {UNITS[name]: rows[name][:count] for name in ("time", "x", "y", "z", "touching", "fz", "sinkage")},
         )
         bed = run.ground.bed
         result["code"] = fingerprint()
@@ -210,6 +213,7 @@ def conclude(
             "mode": say("one_gravity", gravity=plan.numbers["gravity"].value),
             "origin": [float(number) for number in run.ground.origin],
             "beside": quantities_of(beside, lifted, find_flights(beside, lifted)), "beside_law": settings.default_law,
+            "beside_duration": beside.time,
         }  # fmt: skip
         sentences.append(say("modulus", young=1e-6 * softening.young, factor=softening.factor))
         if settings.sleep:
@@ -330,7 +334,9 @@ def _sentences(run: RobotRun, heights: Array, flights: Flights) -> list[str]:
         return [f"{say('touches_nothing')} {to_landing(run, heights, at_end(run, heights))}."]
     way = float(np.hypot(rows["x"][-1] - rows["x"][0], rows["y"][-1] - rows["y"][0]))
     rise = 1e3 * _highest(run, touched)
-    rose = say("rose", rise=rise) if rise >= 0 else say("stayed_below", rise=-rise)
+    lifted = 1e3 * float(heights[0].min())
+    start = say("started_above", height=lifted) if lifted > LIFTED else ""
+    rose = say("rose", rise=rise, start=start) if rise >= 0 else say("stayed_below", rise=-rise, start=start)
     told = launched(run, heights, flown[0][0]) if flown else []
     told.append(say("went", way=1e3 * way, rose=rose))
     lost = bounce_words(crater_losses(run, heights, apart=APART))

@@ -34,6 +34,9 @@ _LEAST_SHARE = 0.03  # Share of a stage from which on its pace so far is taken f
 _QUICK_START = 1.0  # A stage that reports its first share sooner has gone on from an earlier one's [s]
 _GUESSED = 15.0  # A first guess of the rate weighs as much as so much work done [s]
 _MOST_SLOWER = 3.0  # Most by which the machine's pace scales times that are known in seconds [1]
+_SLOWEST = 3e4
+"""Grain-steps in a second of a bed below which kernels are still being compiled [1/s], if all that are awake also make
+less than a step in two seconds. A bed on a busy core does 1e6."""
 _RECENT = 10.0  # A bed's rate is that of so long before now [s]
 _LATE = 0.15  # What a stage that is late is said to take yet, over how late it is [1]
 
@@ -200,7 +203,9 @@ class Progress(AbstractContextManager["Progress"]):
         words += [f"{_percent(slow / grains)} slow"] if slow else []
         (began, first), (now, last) = self._worked[0], self._worked[-1]
         if now > began:
-            words.append(f"{(last - first) / (now - began) / 1e6:.3g} million grain-steps/s")
+            rate = (last - first) / (now - began)
+            compiles = 0 < rate < min(_SLOWEST, 0.5 * awake)
+            words += ["compiling"] if compiles else [f"{rate / 1e6:.3g} million grain-steps/s"] if rate else []
         return words
 
     def message(self, text: str) -> None:

@@ -4,7 +4,9 @@ Imports nothing of ours.
 """
 
 import math
+import sys
 import tomllib
+import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
 from difflib import get_close_matches
@@ -18,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 __all__ = [
     "Coulomb", "Parameter", "check_above_zero", "check_counterweight", "check_friction", "check_not_negative",
     "check_parameters", "check_simulated_gravity", "is_number", "nearest", "read_toml", "sample_times",
+    "warn_user",
 ]  # fmt: skip
 
 
@@ -180,6 +183,18 @@ def sample_times(
     if given[0] < 0 or given[-1] > duration:
         raise ValueError(f"times must lie within 0 to duration = {duration:g} s, not {given[0]:g} to {given[-1]:g} s")
     return given
+
+
+OURS = ("coupling", "dem", "experiments", "rigid", "vis")
+
+
+def warn_user(text: str) -> None:
+    """Warn at the line of the first caller outside of hedgebed's packages. Functions that hedgebed writes have no name
+    of a module."""
+    frame, level = sys._getframe(1), 2
+    while frame.f_back is not None and frame.f_globals.get("__name__", OURS[0]).partition(".")[0] in OURS:
+        frame, level = frame.f_back, level + 1
+    warnings.warn(text, stacklevel=level)
 
 
 def read_toml(path: Path) -> dict[str, Any]:

@@ -113,6 +113,12 @@ def test_a_robot_states_each_error_of_its_answer_or_that_it_is_not_known(more, e
     assert len(numbers.head) == len(errors) + 2
 
 
+def test_a_robot_that_starts_above_the_surface_states_the_height_below_its_rise():
+    said = [answer(answer_tiles(robot_result()), robot_result(ground="rft", start_height=high))[-1].text
+            for high in (0.01, 0.0)]  # fmt: skip
+    assert "10\N{NO-BREAK SPACE}mm above" in said[0] and "mm above" not in said[1]
+
+
 def test_a_flight_that_the_run_cuts_off_heads_the_answer_with_its_apex():
     result = robot_result(ground="rft")
     result["quantities"]["rise_ballistic"] = {"value": 4.1, "std": None, "unit": "m"}

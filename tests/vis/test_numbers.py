@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from vis.page.numbers import beside, between, column, plain, quantity, quote, scale_of, typeset, within
+from vis.page.numbers import beside, between, column, in_one_unit, plain, quantity, quote, scale_of, typeset, within
 from vis.sweep.report import on_axis
 
 SPACE = "\N{NO-BREAK SPACE}"
@@ -95,3 +95,12 @@ def test_powers_of_a_title_are_raised_and_names_stay(given, set_):
 def test_an_interval_that_begins_at_0_states_its_upper_end_alone():
     assert within(0.0, 0.0066, "m").replace(SPACE, " ") == "below 6.6 mm"
     assert within(0.001, 0.0066, "m") == between(0.001, 0.0066, "m")
+
+
+def test_numbers_of_one_sentence_have_one_unit_and_an_end_that_is_hardly_below_0_is_0():
+    shown = [
+        one.replace("\N{NO-BREAK SPACE}", " ") for one in in_one_unit([-0.01, 0.055, 0.0], "m", widest=(-0.01, 2.28))
+    ]
+    assert shown == ["\N{MINUS SIGN}0.01 m", "0.06 m", "0.00 m"]
+    assert in_one_unit([0.0246], "m", widest=(0.0, 0.0296)) == ["24.6\N{NO-BREAK SPACE}mm"]
+    assert between(-7.8e-7, 0.03, "m") == between(0.0, 0.03, "m") != between(-1e-4, 0.03, "m")

@@ -135,7 +135,9 @@ class Sheet:
         for number, reel in enumerate(self.reels):
             title = str(reel.result["title"]) if len(self.reels) == 1 else _with_surface(self.labels[number], reel)
             right = max(p.place[0] + p.place[2] for p in self.panels if p.run == number)
-            _entitle(sheet, typeset(capital(title)), self._left(number), right)
+            if reel.result.get("experiment") != "mujoco":  # whose title begins with the name of a model
+                title = capital(title)
+            _entitle(sheet, typeset(title), self._left(number), right)
         for panel in self.panels:
             if panel.camera.arrow:
                 share = self.shorter * panel.camera.arrow

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from vis.page.limits import kind_of
-from vis.page.numbers import split_spread
+from vis.page.numbers import quantity, split_spread
 from vis.page.page import Block, Page, Section, Tile, listing, table, text, write_template
 from vis.page.sentences import Sentences
 
@@ -17,6 +17,7 @@ __all__ = ["MOST_ROWS", "answer", "without_unknown", "write_page"]
 say = Sentences(__package__)
 MINUS, NBSP = "\N{MINUS SIGN}", "\N{NO-BREAK SPACE}"
 MOST_ROWS = 6
+LIFTED = 1e-4  # Height of the lowest foot of a robot above which a start is said to be above the surface [m]
 _FINDINGS = 3
 _ERRORS = ("± chance", "± grain size", "± bed, softness, speed")
 _MOTIONS = ("tumble", "tumble spatial", "hop")
@@ -65,7 +66,9 @@ def answer(tiles: Sequence[Tile], result: Mapping[str, Any]) -> list[Block]:
         keys.remove("empty_cells")
     if not shown:
         keys = []
-    return [table(head, cells, words=True), *([text(" ".join(map(say, keys)), small=True)] if keys else [])]
+    height = quantity({"value": result.get("start_height"), "std": None, "unit": "m"})
+    said = " ".join(say(key, height=height) for key in keys)
+    return [table(head, cells, words=True), *([text(said, small=True)] if keys else [])]
 
 
 def without_unknown(numbers: Block, notes: Sequence[Block]) -> tuple[Block, list[Block]]:
@@ -133,7 +136,8 @@ def _errors_of_robot(result: Mapping[str, Any], on_grains: bool) -> tuple[Sequen
     rise += [one["low"] for one in [(result.get("forms") or {}).get("ranges", {}).get("highest")] if one]
     told = {
         "one_bed": on_grains and "beds" not in result, "laws_of_sand": forms and not on_grains,
-        "laws_and_grains": forms and on_grains, "below_start": any((one or 0.0) < 0 for one in rise), "no_error": True,
+        "laws_and_grains": forms and on_grains, "start_of_rise": (result.get("start_height") or 0.0) > LIFTED,
+        "below_start": any((one or 0.0) < 0 for one in rise), "no_error": True,
     }  # fmt: skip
     chance = say("of_95") if "beds" in result else _ERRORS[0]
     if on_grains:

@@ -20,6 +20,7 @@ __all__ = [
     "column",
     "digits_for",
     "foldable",
+    "in_one_unit",
     "in_two_digits",
     "plain",
     "quantity",
@@ -144,11 +145,25 @@ def quote(value: float | None, std: float | None = None, unit: str = "1", *, sig
 
 
 def between(low: float, high: float, unit: str) -> str:
-    """Two ends of an interval in SI units, with two digits each and the unit of the upper: "0 to 7.3 mm"."""
+    """Two ends of an interval in SI units, with two digits each and the unit of the upper: "0 to 7.3 mm".
+
+    A lower end less than a thousandth of the upper below 0 is 0.
+    """
+    if -1e-3 * high < low < 0:
+        low = 0.0
     top = quote(high, None, unit, significant=2)
     scale = _scale(float(f"{high:.1e}"), unit)[0]
     bottom = f"{float(f'{low / scale:.2g}'):g}".replace("-", _MINUS) if low else "0"
     return f"{bottom} to {top}"
+
+
+def in_one_unit(values: Sequence[float], unit: str, *, widest: Sequence[float]) -> list[str]:
+    """Numbers in SI units, each with the unit in which the largest of `widest` is shown, to three digits of that."""
+    largest = max(map(abs, widest))
+    scale, shown = _scale(float(f"{largest:.1e}"), unit)
+    decimals = max(0, 2 - math.floor(math.log10(largest / scale))) if largest else 0
+    texts = (_fixed(value / scale, decimals) for value in values)
+    return [f"{text}{_SPACE}{shown}".strip() for text in texts]
 
 
 def within(low: float, high: float, unit: str) -> str:

@@ -47,7 +47,8 @@ def test_beside_a_robot_on_grains_stands_its_run_on_the_law_that_is_the_default(
     beside = RobotOnBed(settings, plan_robot(settings)).beside
     alone = followed(**HOPPER, height=0.012, duration=0.2, **more)
     assert settings.default_law == law == RobotSettings(**HOPPER, **more).ground
-    assert (beside.columns["z"] == alone.columns["z"]).all() and beside.columns["sinkage"].max() > 0.001
+    count = len(alone.columns["z"])  # beside a bed it is followed on, until it rests
+    assert (beside.columns["z"][:count] == alone.columns["z"]).all() and beside.columns["sinkage"].max() > 0.001
 
 
 @pytest.mark.parametrize(

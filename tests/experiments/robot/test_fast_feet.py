@@ -2,6 +2,7 @@
 
 import re
 import warnings
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -70,6 +71,7 @@ def test_an_own_loop_warns_of_a_fast_foot_as_a_run_does(tmp_path, froude, of_run
         warnings.simplefilter("always")
         for _ in range(100):
             mujoco.mj_step(model, data)
+    assert all(Path(one.filename) == Path(__file__) for one in caught)  # the line of the loop, not one of ours
     told = [str(one.message) for one in caught if "m/s" in str(one.message)]
     assert len(told) == (froude > FASTEST)
     for said in told:

@@ -43,6 +43,7 @@ def test_the_apex_is_that_after_the_first_touch_so_that_a_drop_is_no_rise(lander
     step = 0.63 * sunk["macro_step"]  # at sqrt(2 g h) in one exchange of forces
     assert sunk.quantities["highest"].value == pytest.approx(-0.02, abs=step)
     (below,) = [said for said in sunk["departures"]["sentences"] if "below its start" in said]
+    assert sunk["start_height"] == pytest.approx(0.02) and "20 mm above" in below
     assert float(re.findall(r"stayed ([0-9.]+) mm", below)[0]) == pytest.approx(20, abs=1e3 * step)
     _, back = concluded(lander, tmp_path, **BOUNCE, duration=0.2)
     assert back.quantities["highest"].value == pytest.approx(0.0, abs=5e-4)

@@ -1,8 +1,10 @@
 """By how much a robot's answer depends on the form of its law: the same robot on the other laws of sand."""
 
+import re
+
 import pytest
 
-from experiments.robot.forms import NO_FORMS, forms_of, other_laws, with_grains
+from experiments.robot.forms import NO_FORMS, OnLaw, forms_of, other_laws, with_grains
 from experiments.robot.on_grains import RobotFollowed
 from experiments.robot.plan import plan_robot
 from experiments.robot.settings import RobotSettings
@@ -16,6 +18,11 @@ OF_1_G = "bekker"
 
 def planned(**given):
     return plan_robot(RobotSettings(**HOPPER | given))
+
+
+def on_law(value, **more):
+    """All numbers of the answer the same."""
+    return OnLaw(answer=dict.fromkeys(ANSWER, value), **{"time": 0.12} | more)
 
 
 def test_other_laws_are_those_with_numbers_for_this_gravity_and_never_the_own():
@@ -33,7 +40,7 @@ def test_other_laws_are_those_with_numbers_for_this_gravity_and_never_the_own():
 def test_numbers_of_another_ground_have_no_other_laws(given):
     plan = planned(**given)
     assert other_laws(plan) == {}
-    assert forms_of(plan, dict.fromkeys(ANSWER, 1.0), lambda _: pytest.fail("ran"), sure={}) == NO_FORMS
+    assert forms_of(plan, on_law(1.0), lambda _: pytest.fail("ran"), sure={}) == NO_FORMS
 
 
 def test_the_range_holds_each_law_and_a_law_that_fails_is_named():
@@ -43,38 +50,59 @@ def test_the_range_holds_each_law_and_a_law_that_fails_is_named():
         tried.append(other.law)
         if other.law == "bekker":
             raise RuntimeError
-        return dict.fromkeys(ANSWER, 0.1 * len(tried))
+        return on_law(0.1 * len(tried))
 
     sure = {"highest": {"low": -0.5, "high": 0.6}}
-    forms = forms_of(plan, dict.fromkeys(ANSWER, 0.05), follow, sure=sure)
+    forms = forms_of(plan, on_law(0.05), follow, sure=sure)
     most = max(answer["highest"] for answer in forms.numbers["laws"].values())
     assert forms.numbers["ranges"]["largest_force"]["low"] == 0.05
     assert forms.numbers["ranges"]["largest_force"]["high"] == most == pytest.approx(0.1 * (len(tried) - 1))
     assert forms.numbers["ranges"]["highest"]["low"] == -0.5
-    assert "bekker" in forms.words[-1] and "bekker" not in forms.numbers["laws"]
+    assert any("bekker" in said for said in forms.words) and "bekker" not in forms.numbers["laws"]
 
 
 @pytest.mark.parametrize(("flight", "told"), [(0.2, "highest"), (0.0, "sinkage_largest")])
 def test_real_sand_is_expected_between_a_law_and_grains_and_the_range_holds_both(flight, told):
     plan = planned()
-    answers = {law: dict.fromkeys(ANSWER, 0.01 * place) for place, law in enumerate(other_laws(plan), 1)}
-    laws = forms_of(plan, dict.fromkeys(ANSWER, 0.05), lambda other: answers[named(other)], sure={})
-    assert laws.numbers["laws"]["rft, inertia=2"] == answers["rft, inertia=2"]
+    answers = {law: on_law(0.01 * place) for place, law in enumerate(other_laws(plan), 1)}
+    laws = forms_of(plan, on_law(0.05), lambda other: answers[named(other)], sure={})
+    assert laws.numbers["laws"]["rft, inertia=2"] == answers["rft, inertia=2"].answer
     own = dict.fromkeys(ANSWER, 7.0) | {"longest_flight": flight}
     forms = with_grains(laws, own)
     assert forms.numbers["ranges"][told]["high"] == 7.0 and forms.numbers["ranges"][told]["value"] == 7.0
     assert forms.numbers["ranges"][told]["low"] == laws.numbers["ranges"][told]["low"] == 0.01
     word = {"highest": "rise", "sinkage_largest": "sinkage"}[told]
-    assert f"inertia=2 ({word} 10" in forms.words[0] and f"({word} 7.0 m)" in forms.words[0]
-    assert "Real sand" in laws.words[0] and "'bed'" in laws.words[0]
+    assert f"{word} is 0.01" in forms.words[0] and "inertia=2 0.01 m;" in forms.words[0]
+    assert [re.findall("[0-9]+ m", one.words[1]) for one in (laws, forms)] == [[], []]  # one range only
+    assert "Real sand" in laws.words[1] and "'bed'" in laws.words[1] and "inertia=2" in forms.words[1]
     assert with_grains(NO_FORMS, own) == NO_FORMS
     landings = [any("--duration" in words and "0.12 s" in words for words in one.words) for one in (laws, forms)]
     assert landings == [True, True] and laws.numbers["duration"] == forms.numbers["duration"] == 0.12
 
 
+def test_a_law_on_which_the_robot_still_pushes_off_is_left_out_and_named_and_so_in_the_run_itself():
+    plan, tried = planned(), []
+
+    def follow(other):
+        tried.append(named(other))
+        return on_law(0.2, time=0.48, rising=tried[-1] in ("rft, inertia=2", "bekker"))
+
+    forms = forms_of(plan, on_law(-0.9, rising=True), follow, sure={"highest": {"low": -0.95, "high": -0.9}})
+    assert tried[0] == "rft" and forms.numbers["ranges"]["highest"]["low"] == 0.2
+    assert forms.numbers["rising"] == ["rft, inertia=2", "bekker"] and not set(forms.numbers["rising"]) & set(
+        forms.numbers["laws"]
+    )
+    for one in (forms, with_grains(forms, dict.fromkeys(ANSWER, 0.3))):
+        (left_out,) = [said for said in one.words if "rft, inertia=2, bekker" in said]
+        assert "0.48 s" in left_out
+        assert "between rft and" in " ".join(one.words)  # the law that is there
+    none = forms_of(plan, on_law(-0.9, rising=True), lambda _: on_law(0.2, rising=True), sure={})
+    assert not none.numbers and "bekker" in none.words[0] and with_grains(none, {}) == none
+
+
 def test_a_robot_that_leaves_no_law_has_no_later_landing():
-    still = dict.fromkeys(ANSWER, 0.05) | {"longest_flight": 0.0}
-    assert not any("--duration" in words for words in forms_of(planned(), still, lambda _: still, sure={}).words)
+    own = OnLaw(answer=dict.fromkeys(ANSWER, 0.05) | {"longest_flight": 0.0}, time=0.12)
+    assert not any("--duration" in words for words in forms_of(planned(), own, lambda _: own, sure={}).words)
 
 
 def named(plan):

@@ -87,6 +87,17 @@ def test_a_loop_of_ones_own_takes_no_grains():
         law_of_run(load_model("hopper"), ["foot"], ground="bed")
 
 
+def test_the_notes_begin_with_the_warnings_name_a_floor_that_is_on_and_have_numbers_that_are_given_too():
+    model = load_model("hopper")
+    on = law_of_run(model, ["foot"], surface="sand", ground_parameters={"inertia": 2}).notes
+    switch_off_floors(model)
+    off = law_of_run(model, ["foot"], surface="sand").notes
+    assert on[0].startswith("warning") and "contype" in on[0] and not any("contype" in said for said in off)
+    (given,) = [said for said in on if said.startswith("inertia = 2 ")]
+    assert "given" in given and not any("warning" in said for said in on[1:])
+    assert any(said.startswith("inertia = 1.1 ") for said in off)
+
+
 def test_the_loop_on_grains_of_the_page_runs_as_it_is_printed_and_its_controller_works(monkeypatch, tmp_path):
     """The bed is three layers of grains, and the run shorter: the rest is what docs/mujoco.md prints."""
     from spatial_runs import grain_bed

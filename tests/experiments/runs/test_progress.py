@@ -293,6 +293,16 @@ def test_a_bed_is_shown_by_its_grains_the_share_awake_and_its_rate(clock):
     assert progress.bed_words == []
 
 
+@pytest.mark.parametrize(("steps", "words"), [(0, []), (2_000, ["compiling"]), (2e6, ["1 million grain-steps/s"])])
+def test_a_bed_whose_first_steps_wait_for_kernels_has_no_rate(clock, steps, words):
+    progress = Progress(clock=clock)
+    progress.stage("robot", total=100)
+    for done in (0, steps):
+        progress.show_grains(grain_count=6_000, awake_count=6_000, grain_steps=int(done))
+        clock.now += 2
+    assert progress.bed_words[2:] == words
+
+
 def test_lines_and_bars_show_the_bed(clock):
     stream = io.StringIO()
     console = Console(file=io.StringIO(), force_terminal=True, width=140, color_system=None)

@@ -1,0 +1,117 @@
+"""How long a robot is followed on a law: until it flies or is at rest, so that its rise is not that of a cut push."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from experiments.robot.feet import heights_of
+from experiments.robot.flight import find_flights, pushes_off
+from experiments.robot.forms import other_laws
+from experiments.robot.on_grains import RobotFollowed, RobotOnBed
+from experiments.robot.on_laws import answer_of_run, follow_on, on_law
+from experiments.robot.plan import plan_robot
+from experiments.robot.result import conclude
+from experiments.robot.settings import RobotSettings
+
+pytest.importorskip("mujoco", reason="mujoco is not installed: pip install 'hedgebed[mujoco]'")
+
+LANDER = """<mujoco model="lander"><worldbody><body name="body" pos="0 0 0.2"><freejoint/>
+  <geom name="tip" type="cylinder" size="0.03 0.01" mass="1.5"/></body></worldbody></mujoco>"""
+BRICK = {"surface": "brick", "stiffness": 15e3, "damping": 0.0, "height": 0.02, "gravity": 9.81}
+"""A fall of 20 mm takes 64 ms, half a swing of 1.5 kg on 15 kN/m 31 ms; the flight after it 128 ms, back to 20 mm."""
+HOPPER = {"model": "hopper", "feet": ("foot",), "surface": "sand", "height": 0.012, "controller": "hopper:control"}
+"""Its push begins at 0.25 s and lasts to 0.34 s."""
+
+
+@pytest.fixture
+def planned(tmp_path):
+    """The plan of a plate of 60 mm with 1.5 kg."""
+    (tmp_path / "lander.xml").write_text(LANDER, encoding="utf-8")
+
+    def plan(**given):
+        return plan_robot(RobotSettings(model=str(tmp_path / "lander.xml"), feet=("tip",), **given))
+
+    return plan
+
+
+def run_of(plan):
+    return RobotFollowed(plan.settings, plan).run_on_law()
+
+
+def test_a_run_that_ends_in_contact_on_its_way_up_goes_on_to_the_flight_and_has_the_apex_of_that(planned):
+    plan = planned(**BRICK, duration=0.085)
+    cut, whole = run_of(plan), run_of(plan)
+    cut.run()
+    follow_on(whole)
+    assert on_law(cut).rising and answer_of_run(cut)["highest"] < -0.019 and answer_of_run(cut)["longest_flight"] == 0
+    found = on_law(whole)
+    assert not found.rising and 0.095 < found.time < 0.2
+    assert found.answer["highest"] == pytest.approx(0.0, abs=5e-4)
+    assert found.answer["longest_flight"] == pytest.approx(0.128, rel=0.02)
+
+
+def test_a_robot_that_has_landed_is_followed_until_it_is_at_rest_and_one_that_falls_still_is_not(planned):
+    landed = run_of(planned(surface="sand", height=0.02, duration=0.1))
+    falling, down = (run_of(planned(**BRICK, duration=duration)) for duration in (0.03, 0.07))
+    follow_on(landed)
+    assert 0.1 < landed.time < 0.3
+    speeds = np.gradient(landed.columns["z"], landed.columns["time"])
+    assert abs(speeds[landed.columns["time"] > landed.time - 0.023]).max() < np.sqrt(2 * 9.81 * 1e-3)
+    follow_on(falling)
+    down.run()
+    assert falling.time == pytest.approx(0.03, abs=1e-3)
+    assert not on_law(falling).rising and not on_law(down).rising
+
+
+def test_a_robot_that_has_hopped_is_not_followed_into_its_next_push():
+    """The second push of the leg begins at 0.75 s."""
+    run = run_of(plan_robot(RobotSettings(**HOPPER, duration=0.8)))
+    follow_on(run)
+    assert run.time == pytest.approx(0.8, abs=1e-3) and not on_law(run).rising
+    assert answer_of_run(run)["highest"] > 0.03
+
+
+def test_a_controller_that_knows_the_duration_alone_ends_the_law_there(planned):
+    def fails(_, data):
+        if data.time > 0.086:
+            raise ValueError
+
+    plan = replace(planned(**BRICK, duration=0.085), controller=fails)
+    run = run_of(plan)
+    follow_on(run)
+    assert run.time == pytest.approx(0.085, abs=1e-3) and run.done and len(run.columns["z"]) == len(run.feet)
+    assert on_law(run).rising
+
+
+def test_a_run_of_its_own_that_ends_so_is_warned_of(planned, tmp_path):
+    for duration, warned in ((0.085, True), (0.15, False)):
+        plan = planned(**BRICK, duration=duration)
+        run = run_of(plan)
+        run.run()
+        assert (pushes_off(run, find_flights(run, heights_of(run))) is not None) == warned
+        assert any("pushes off" in one for one in conclude(plan.settings, plan, run, tmp_path).warnings) == warned
+
+
+def on_bed():
+    settings = RobotSettings(**HOPPER, ground="bed", grain=0.012, bed_size=(0.24, 0.24, 0.2), duration=0.3)
+    plan = plan_robot(settings)
+    return RobotOnBed(settings, plan), plan
+
+
+def test_the_law_beside_a_bed_goes_on_to_its_flight():
+    """The push is half done at 0.3 s."""
+    beside = on_bed()[0].beside
+    assert beside.time > 0.33 and answer_of_run(beside)["longest_flight"] > 0.15
+
+
+@pytest.mark.long
+def test_beside_a_bed_every_law_starts_as_the_grains_do_and_goes_on_to_its_flight():
+    """The leg hops on every law."""
+    bed, plan = on_bed()
+    others = other_laws(plan.on_law("rft"))
+    assert {round(other.robot().clearance, 9) for other in others.values()} == {0.012}
+    laws = bed.forms.numbers["laws"]
+    assert set(laws) == {"rft", *others} and bed.forms.numbers["rising"] == []
+    assert all(answer["highest"] > 0.03 and answer["longest_flight"] > 0.15 for answer in laws.values())
+    assert bed.forms.numbers["longest"] > 0.33 and any("then on" in said for said in bed.forms.words)
