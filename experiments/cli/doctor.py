@@ -9,6 +9,7 @@ import sys
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from rich.console import Console
@@ -135,6 +136,14 @@ def _lammps() -> Finding:
     return Finding("LAMMPS", True, f"{program}, started by {launcher}")
 
 
+def _extra(name: str, package: str) -> Finding:
+    """A package of the extra `name`."""
+    try:
+        return Finding(package, True, version(package))
+    except PackageNotFoundError:
+        return Finding(package, False, "not found", f"pip install '.[{name}]'")
+
+
 def examine() -> list[Finding]:
     """Look at everything. Takes a few seconds: Taichi and OpenGL are tried in processes of their own."""
     with ThreadPoolExecutor(max_workers=2) as pool:
@@ -152,6 +161,8 @@ def examine() -> list[Finding]:
             _opengl(opengl.result()),
             _peer("LIGGGHTS", ["liggghts"], "liggghts"),
             _lammps(),
+            _extra("mujoco", "mujoco"),
+            _extra("sweep", "distributed"),
             _peer("YADE", ["yade"], "yade"),
             _peer("MPI", ["mpirun"], "openmpi-bin"),
             _peer("C compiler", ["cc"], "gcc"),

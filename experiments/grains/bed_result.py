@@ -3,6 +3,8 @@
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
+
 from coupling import MOST_REVERSAL, CoupledTumble, Master, SpatialRun
 from coupling.robot import RobotRun
 from dem import Bed
@@ -16,12 +18,13 @@ from .settings import GrainsSettings
 from .softening import Softening, stable_overlap
 
 __all__ = [
-    "bed_numbers", "bed_warnings", "overlap_warning", "residual_warning", "reversal_warning", "unsettled_warning",
-    "write_bed_series",
+    "bed_numbers", "bed_warnings", "overlap_warning", "residual_warning", "reversal_warning", "sides_warning",
+    "unsettled_warning", "write_bed_series",
 ]  # fmt: skip
 
 AnyRun = CoupledTumble | SpatialRun | RobotRun
 PACKING_OFF = 0.02  # Difference of the packing from that of the grains' calibration that is worth a warning [1]
+SIDES_MOVED = 0.5  # Way of the grains at the sides of a bed, over their diameter, that is worth a warning [1]
 MOST_RESIDUAL = 0.01  # A larger energy_residual is worth a warning [1]
 BED_COLUMNS = {
     "time": "t_s", "momentum_error": "momentum_error_N_s", "angular_momentum_error": "angular_momentum_error_N_m_s",
@@ -70,6 +73,24 @@ def bed_warnings(bed: Bed, surface: str, *, across: float, foot: str = "spike") 
         yield say("packing_off", packing=bed.packing_fraction, surface=own)
     if doubt := caveat(bed.material):
         yield doubt
+
+
+def sides_warning(bed: Bed) -> str | None:
+    """Warning of a bed so narrow that the push moved the grains at its periodic sides: the copies of the foot beyond
+    them push the same grains.
+
+    Of the grains whose centre began less than a diameter from a side, in the upper half of the bed, the median way.
+    """
+    grains = bed.grains(contacts=False)
+    diameter = 2 * float(grains.radius.mean())
+    start = grains.position - grains.displacement
+    across = start[:, :2] % np.array(bed.size[:2])
+    side = np.minimum(across, np.array(bed.size[:2]) - across).min(axis=1) < diameter
+    side &= start[:, 2] > 0.5 * float(bed.surface)
+    if not side.any():
+        return None
+    way = float(np.median(np.linalg.norm(grains.displacement[side], axis=1))) / diameter
+    return say("sides_moved", way=way) if way > SIDES_MOVED else None
 
 
 def overlap_warning(bed: Bed, softening: Softening, max_overlap: float) -> str | None:

@@ -221,6 +221,7 @@ def conclude(
             sentences.append(say("slept", share=done / awake))
         warnings += [
             grains.reversal_warning(run.dissipation_reversal),
+            grains.sides_warning(bed),
             grains.overlap_warning(bed, softening, settings.max_overlap),
             *grains.bed_warnings(bed, plan.surface.name, across=across, foot="foot"),
             say("one_bed"),

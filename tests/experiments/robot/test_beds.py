@@ -1,6 +1,7 @@
 """Several beds under one robot: their mean and its interval, what a law leaves open, and what stands beside grains."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from spatial_runs import EXAMPLES, grain_bed
 
 from experiments.compare.robots import read_moved
 from experiments.grains.bed_progress import show_bed
+from experiments.grains.bed_result import sides_warning
 from experiments.grains.on_bed import PlatformOnBed
 from experiments.platform.law_spread import moved
 from experiments.robot import experiment as robot
@@ -256,3 +258,17 @@ def test_a_ground_file_gives_the_range_of_the_95_percent_intervals_of_its_parame
     ]
     sure = result["sure"]["sinkage_largest"]
     assert sure["high"] - sure["value"] == pytest.approx(NORMAL * abs(ends[0] - ends[1]) / 2, rel=1e-6)
+
+
+@pytest.mark.parametrize(("way", "said"), [(0.2, False), (1.5, True)])
+def test_a_bed_whose_sides_moved_is_said_to_be_too_narrow(way, said):
+    # 10 mm grains; those of the lower half and of the middle move far and do not count.
+    places = np.stack(np.meshgrid(*[np.arange(0.005, 0.2, 0.01)] * 3, indexing="ij"), -1).reshape(-1, 3)
+    at_side = (np.minimum(places, 0.2 - places)[:, :2] < 0.01).any(axis=1) & (places[:, 2] > 0.1)
+    moved_by = np.zeros_like(places)
+    moved_by[:, 2] = np.where(at_side, way * 0.01, 0.05)
+    grains = SimpleNamespace(radius=np.full(len(places), 0.005), position=places + moved_by, displacement=moved_by)
+    bed = SimpleNamespace(size=(0.2, 0.2, 0.25), surface=0.2, grains=lambda contacts: grains)
+    warning = sides_warning(bed)
+    assert (warning is not None) == said
+    assert not said or "1.5 diameters" in warning
