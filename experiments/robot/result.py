@@ -325,7 +325,8 @@ def _cut_off(run: RobotRun, heights: Array, flights: Flights) -> str:
     left, landing = flights.left, to_landing(run, heights, flights.left)
     if left is None:
         return say("airborne_for_ever", landing=landing)
-    return say("airborne", speed=left[1], so_far=1e3 * _highest(run, flights.touched), landing=landing)
+    way = "upwards" if left[1] >= 0 else "downwards"
+    return say("airborne", speed=abs(left[1]), way=way, so_far=1e3 * _highest(run, flights.touched), landing=landing)
 
 
 def _sentences(run: RobotRun, heights: Array, flights: Flights) -> list[str]:
