@@ -20,7 +20,7 @@ def test_the_script_of_the_readme_prints_what_it_states_and_keeps_its_run(tmp_pa
     """
     page = (ROOT / "README.md").read_text(encoding="utf-8")
     ((script, stated),) = re.findall(r"^```python\n(.*?)^```\n```\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
-    ranges = rf"changes the bed: \[six\]\(\S+\) gave ({NUMBER}) to ({NUMBER}) N, ({NUMBER}) to ({NUMBER}) mJ\."
+    ranges = rf"changes the bed: \[six runs\]\(\S+\) gave ({NUMBER}) to ({NUMBER}) N, ({NUMBER}) to ({NUMBER}) mJ\."
     ((low, high, least, most),) = [tuple(map(float, found)) for found in re.findall(ranges, page)]
     done = subprocess.run(
         [sys.executable, "-c", script], cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(ROOT)},
