@@ -99,12 +99,6 @@ def _least(counted: Row) -> float:
     return 100 * float(beta.ppf(1 - _BOUND, right, named - right + 1))
 
 
-def _spread_words(kind: str, std: float) -> str:
-    """bed unloading by 2.2 %"""
-    unit = _SPREAD_UNITS.get(kind)
-    return f"{kind} by {100 * std:.2g} %" if unit is None else f"{kind} by {std:.2g} {unit}"
-
-
 _SPREAD_UNITS = {
     "force": "N, each in its own way", "depth": "m, each in its own way", "accel": "m/s2, each in its own way",
     "depth zero": "m", "force zero": "N",
@@ -116,7 +110,8 @@ def spread_sentences(model_std: Mapping[str, float], *, granular: bool) -> list[
     """By what replicates differ beyond the sensors, in a sentence; of several kinds the sizes are guesses.
     `model_std`: kind -> standard deviation; `granular`: whether the ground is a bed of grains."""
     if len(model_std) > 1:
-        return [say("spreads", kinds=" and ".join(map(_spread_words, model_std, model_std.values())))]
+        sizes = {k: (s, _SPREAD_UNITS[k]) if k in _SPREAD_UNITS else (100 * s, "%") for k, s in model_std.items()}
+        return [say("spreads", kinds=" and ".join(f"{k} by {s:.2g} {unit}" for k, (s, unit) in sizes.items()))]
     whose = "the bed" if granular else "the surface, the rig or the start"
     return [
         say("spread", kind=kind, std=std, unit=_SPREAD_UNITS.get(kind, "(relative)"),

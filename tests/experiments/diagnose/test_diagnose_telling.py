@@ -19,6 +19,7 @@ from experiments.diagnose.report.sentences import (
     candidate_rows,
     remark_sentences,
     size_sentences,
+    spread_sentences,
     sure_sentences,
     told_tables,
     unnamed_sentence,
@@ -298,6 +299,11 @@ def test_what_to_do_next_follows_the_phase_or_the_column_that_holds_what_is_left
     )
     assert "ten times" in rest and "twice as deep" in depth
     golden("diagnose/telling_next", {"at rest": rest, "with depth": depth, "with nothing": nothing})
+
+
+def test_what_replicates_differ_by_in_several_ways_has_its_sizes_and_units():
+    (said,) = spread_sentences({"bed": 0.0222, "depth zero": 2.5e-4}, granular=True)
+    assert "by 2.2 %" in said and "by 0.00025 m" in said
 
 
 def test_the_noise_of_one_sensor_is_one_sentence_whatever_the_number_of_its_rates():
