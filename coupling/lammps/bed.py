@@ -312,6 +312,10 @@ class LammpsBed:
         self.surface = surface_height(grains.position[:, 2], self.radius, area, bulk=self.packing_fraction)
         return taken
 
+    def take_surface(self, state: State) -> None:
+        """Take the surface and packing of a `state` that is restored later; its grains need not come to rest first."""
+        self.surface, self.packing_fraction = (float(number) for number in np.asarray(state["numbers"])[2:])
+
     # What the grains do
 
     def _dumped(self) -> Vector:

@@ -17,6 +17,7 @@ from experiments.runs.result import Result
 from experiments.runs.stopping import held_back
 from experiments.runs.whole_runs import publish
 from rigid.checks.unfit import failed_as
+from rigid.ground.reaction import State
 
 from . import say
 from .bed_progress import show_bed
@@ -48,6 +49,7 @@ class Followed(ABC, Generic[Run]):
     frames: Callable[..., Frames]  # Of a run, a folder, the settings and whether it is `resumed`: what writes frames
     sinkage: Callable[[Any], float]  # Of a run: how deep the platform stands once it is set down [m]
     write_series: Callable[[Any, Path], Any]  # Of a run and a folder: writes the series, as far as it has come
+    kept: State | None = None  # The checkpoint that the run continues from, once it is read
 
     def notice(self, run: Run) -> str | None:
         """A message on the way, after a step; None where there is none."""
@@ -69,7 +71,7 @@ class Followed(ABC, Generic[Run]):
 
         Raises KeyboardInterrupt and RuntimeError with the state saved.
         """
-        kept = folder.load_checkpoint(CHECKPOINT)
+        kept, self.kept = self.kept or folder.load_checkpoint(CHECKPOINT), None
         if kept is not None:
             bed = run.ground.bed if isinstance(run.ground, BedGround) else None
             limit = bed.overlap_limit if bed is not None else 0.0

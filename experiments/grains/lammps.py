@@ -3,11 +3,14 @@
 import time
 from typing import TYPE_CHECKING, Any
 
+from coupling.ground import part_of
+
 from . import say
 
 if TYPE_CHECKING:
     from coupling import BedGround
     from experiments.runs.progress import Progress
+    from rigid.ground.reaction import State
 
 __all__ = ["ON_GRAINS", "RANKS", "check_lammps", "cone_note", "in_lammps", "lammps_fault", "moved_to_lammps"]
 
@@ -53,11 +56,19 @@ def check_lammps(settings: Any) -> None:
             raise ValueError(f"ground = 'lammps': {error}") from None
 
 
-def moved_to_lammps(bed: Any, settings: Any, progress: "Progress", *, begin: float = 0.0) -> Any:
-    """The grains of a prepared bed as a `coupling.lammps.LammpsBed`, at rest there."""
+def moved_to_lammps(
+    bed: Any, settings: Any, progress: "Progress", *, begin: float = 0.0, kept: "State | None" = None
+) -> Any:
+    """The grains of a prepared bed as a `coupling.lammps.LammpsBed`, at rest there.
+
+    ``kept``: the checkpoint of a run that is restored next. It has the grains, which need not come to rest first.
+    """
     from coupling.lammps import LammpsBed
 
     moved = LammpsBed(bed, ranks=settings.ranks or 1, begin=begin)
+    if kept is not None:
+        moved.take_surface(part_of(part_of(kept, "ground"), "bed"))
+        return moved
     said = time.monotonic()
 
     def tell(taken: float, energy: float) -> None:
@@ -74,9 +85,11 @@ def moved_to_lammps(bed: Any, settings: Any, progress: "Progress", *, begin: flo
 
 
 def in_lammps(
-    bed: Any, body: Any, settings: Any, progress: "Progress", *, begin: float = 0.0, **options: Any
-) -> "BedGround":
-    """A spike or members on the grains of a prepared bed in LAMMPS; `options`: of `BedGround`."""
+    bed: Any, body: Any, settings: Any, progress: "Progress", *, begin: float = 0.0, kept: "State | None" = None,
+    **options: Any,
+) -> "BedGround":  # fmt: skip
+    """A spike or members on the grains of a prepared bed in LAMMPS; `kept`: as of `moved_to_lammps`; `options`: of
+    `BedGround`."""
     from coupling.lammps import LammpsGround
 
-    return LammpsGround(moved_to_lammps(bed, settings, progress, begin=begin), body, begin=begin, **options)
+    return LammpsGround(moved_to_lammps(bed, settings, progress, begin=begin, kept=kept), body, begin=begin, **options)

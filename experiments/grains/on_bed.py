@@ -30,7 +30,7 @@ from rigid.platform.rig import STANDARD_GRAVITY
 from . import say
 from .bearing import STICKING, resistance_of
 from .bed_progress import BedProgress
-from .following import Followed, Run
+from .following import CHECKPOINT, Followed, Run
 from .recipes import recipe_of
 from .settings import GrainsSettings
 from .sizes import carried_height, expected_grain_count
@@ -275,4 +275,5 @@ class PlatformOnBed(Followed[Run], Generic[Settings, Run, Expected]):
             progress.message(say("by_recipe", material=self.material, stages=" ".join(self.stages)))
         if self.plans:
             progress.plan(self.costs, seconds={"report": self.report_seconds})
+        self.kept = folder.load_checkpoint(CHECKPOINT)
         return self.finish(self.stepper(self.bed(self.softening(), progress)), folder, progress)

@@ -5,6 +5,7 @@ inertia of the grains, damping, the power of the depth. None of them is the trut
 the error that the form of the law makes, and no bound.
 """
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -104,9 +105,15 @@ def forms_of(plan: RobotPlan, own: OnLaw, follow: Callable[[RobotPlan], OnLaw], 
     return _ranges(numbers, own.answer, ends, on_grains=False)
 
 
-def with_grains(laws: Forms, best: Answer) -> Forms:
-    """The ranges over `laws`, widened to a run on grains with the answer `best`; as they are where there are none."""
-    return _ranges(laws.numbers, best, [best], on_grains=True) if laws.numbers else laws
+def with_grains(laws: Forms, best: Answer, *, depth: float | None = None) -> Forms:
+    """The ranges over `laws`, widened to a run on grains with the answer `best`; as they are where there are none.
+
+    ``depth``: of the bed [m], so that laws on which a foot sinks deeper are named; None: as `laws` have it.
+    """
+    if not laws.numbers:
+        return laws
+    numbers = laws.numbers if depth is None else {**laws.numbers, "bed_depth": depth}
+    return _ranges(numbers, best, [best], on_grains=True)
 
 
 def _ranges(numbers: Json, best: Answer, more: Sequence[Answer], *, on_grains: bool) -> Forms:
@@ -141,6 +148,9 @@ def expected_words(numbers: Json, best: Answer, *, on_grains: bool) -> list[str]
     said = [say("forms_with_grains" if on_grains else "forms_of_laws", **words), *_left_out(numbers)]
     if near is not None:
         said.append(say("expected_of_grains" if on_grains else "expected_of_laws", law=near))
+    bed_depth = numbers.get("bed_depth", math.inf)
+    deeper = [law for law, answer in answers.items() if answer["sinkage_largest"] > bed_depth]
+    said += [say("deeper_than_bed", laws="; ".join(deeper), depth=1e3 * bed_depth)] if deeper else []
     duration = numbers.get("duration")
     if duration and any(answer["longest_flight"] > 0 for answer in (best, *answers.values())):
         longest = numbers.get("longest", duration)

@@ -199,12 +199,11 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
         """
         law = self.settings.default_law
         if law == "spring-damper":
-            run = self.forecast.run
-            follow_on(run)
-            return run
-        plan = self.plan.on_law(law)
-        robot = plan.robot()
-        run = RobotRun(robot, plan.law_feet(robot), duration=self.duration, **_stepping(self.settings))
+            run = self.run_on_law(as_spring=True)
+        else:
+            plan = self.plan.on_law(law)
+            robot = plan.robot()
+            run = RobotRun(robot, plan.law_feet(robot), duration=self.duration, **_stepping(self.settings))
         follow_on(run)
         return run
 
@@ -416,7 +415,7 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
         s, make = self.settings, BedFeet
         if s.ground == "lammps":
             bed.overlap_limit = run_limit(s.max_overlap)
-            bed, make = moved_to_lammps(bed, s, self.progress), LammpsFeet
+            bed, make = moved_to_lammps(bed, s, self.progress, kept=self.kept), LammpsFeet
         return make(
             bed, self._robot.feet, touch=1e-3 * self.weight, friction=s.spike_friction,
             restitution=s.spike_restitution, **self.layout(bed),
@@ -435,7 +434,8 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
         return forms_of(self.plan.on_law(law), on_law(self.beside), self._long_enough, sure={})
 
     def conclude(self, run: RobotRun, folder: Path) -> Result:
+        forms = with_grains(self.forms, answer_of_run(run), depth=self.settings.bed_size[2])
         return conclude(
             self.settings, self.told, run, folder, beside=self.beside, softening=self.softening(),
-            across=self.narrowest / self.settings.grain, forms=with_grains(self.forms, answer_of_run(run)),
+            across=self.narrowest / self.settings.grain, forms=forms,
         )  # fmt: skip

@@ -116,7 +116,17 @@ class RobotPlan:
 
     def announcement(self) -> list[str]:
         """What was not given, then the warnings."""
-        return [*self._chosen, *self.in_words(), *self.notes, *(f"warning: {warning}" for warning in self.warnings)]
+        warned = (f"warning: {warning}" for warning in self.warnings_of_run)
+        return [*self._chosen, *self.in_words(), *self.notes, *warned]
+
+    @property
+    def warnings_of_run(self) -> list[str]:
+        """The warnings of a run, which switches the floors of the model off."""
+        return [*self._floors("floors_off"), *self.warnings]
+
+    def _floors(self, key: str) -> list[str]:
+        """The sentence `key` on the floors of the model; none without any."""
+        return [say(key, floors=", ".join(self.floors))] if self.floors else []
 
     @property
     def _chosen(self) -> list[str]:
@@ -143,8 +153,7 @@ class RobotPlan:
 
         A floor of the model is on there, unless the loop switches it off.
         """
-        off = say("floors_off", floors=", ".join(self.floors))
-        found = [say("floors_on", floors=", ".join(self.floors)) if one == off else one for one in self.warnings]
+        found = [*self._floors("floors_on"), *self.warnings]
         return [*(f"warning: {one}" for one in found), *self._chosen, *self.notes, *self.in_words(given=True)]
 
 
@@ -189,8 +198,6 @@ def plan_robot(settings: RobotSettings, *, folder: Path | None = None, model: An
     warnings = of_friction + [part.note for foot in robot.feet for part in foot.parts if part.note]
     if robot.hangs:
         warnings.append(say("hangs"))
-    if robot.floors:
-        warnings.append(say("floors_off", floors=", ".join(robot.floors)))
     of_surface = settings.on_grains or settings.ground == "spring-damper"
     scales, soles = {}, {}
     for foot, turn in zip(robot.feet, robot.pose.turn.reshape(-1, 4), strict=True):

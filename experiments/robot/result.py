@@ -18,6 +18,7 @@ from experiments.runs.result import quantities_of as as_quantities
 from experiments.runs.types import Json
 from rigid.platform.solids import Mesh, merge
 from rigid.spatial.quaternions import to_matrix
+from vis.page.answer import LIFTED
 from vis.robot.answer import BALLISTIC
 
 from . import say
@@ -41,7 +42,6 @@ from .settings import RobotSettings
 __all__ = ["RobotFrames", "conclude", "deepest_at_start", "write_series_of"]
 
 BELOW = 1e-3  # What is no foot and goes deeper than this is worth a warning [m]
-LIFTED = 0.1  # Height of the lowest foot above which a start is said to be above the surface [mm]
 UNITS = {
     "time": "t_s", "x": "x_m", "y": "y_m", "z": "z_m", "kinetic_energy": "kinetic_J", "potential_energy": "potential_J",
     "torque_work": "torque_work_J", "actuator_work": "actuator_work_J", "given": "given_J", "taken": "taken_J",
@@ -178,7 +178,7 @@ def conclude(
         title, sentences = say("title_invalid", title=title), [say("invalid"), *sentences]
     warnings: list[str | None] = [
         say("idle", time=run.time) if idle(plan, run) else None,
-        *plan.warnings, balance_warning(settings, run), grains.unsettled_warning(run.master),
+        *plan.warnings_of_run, balance_warning(settings, run), grains.unsettled_warning(run.master),
         say("unstable", load=run.load, most=run.most_load) if run.load > run.most_load else None,
         say("went_below", name=run.lowest_other[1], depth=-1e3 * run.lowest_other[0])
         if run.lowest_other[0] < -BELOW else None,
@@ -266,6 +266,7 @@ def quantities_of(run: RobotRun, heights: Array, flights: Flights) -> dict[str, 
         "displacement_y": (float(rows["y"][-1] - rows["y"][0]), "m", "likewise"),
         "displacement_z": (float(rows["z"][-1] - rows["z"][0]), "m", "the same, upwards"),
         "highest": (_highest(run, touched), "m", say("highest")),
+        "rise_from_lowest": (_from_lowest(run, flights), "m", say("from_lowest")),
         "first_touch": (None if touched is None else float(rows["time"][touched]), "s", say("first_touch")),
         "flights": (float(len(flights.rows)), "1", say("flights", apart=1e3 * APART)),
         "longest_flight": (flights.longest, "s", say("longest_flight")),
@@ -296,6 +297,19 @@ def _highest(run: RobotRun, touched: int | None) -> float:
     """
     z = run.columns["z"]
     return float(z[touched or 0 :].max() - z[0])
+
+
+def _from_lowest(run: RobotRun, flights: Flights) -> float | None:
+    """Largest rise of the centre of mass from any moment to a later one, after the first touch [m]: over a crouch.
+
+    It includes the flight that the end of the run cuts off. None where nothing touches.
+    """
+    if flights.touched is None:
+        return None
+    z = run.columns["z"][flights.touched :]
+    end = z[-1] + (flights.left[0] if flights.left is not None else 0.0)
+    later = np.maximum(np.maximum.accumulate(z[::-1])[::-1], end)
+    return float((later - z).max())
 
 
 def _ballistic(run: RobotRun, heights: Array, flights: Flights, found: Mapping[str, Number]) -> dict[str, Number]:
@@ -336,11 +350,12 @@ def _sentences(run: RobotRun, heights: Array, flights: Flights) -> list[str]:
         return [f"{say('touches_nothing')} {to_landing(run, heights, at_end(run, heights))}."]
     way = float(np.hypot(rows["x"][-1] - rows["x"][0], rows["y"][-1] - rows["y"][0]))
     rise = 1e3 * _highest(run, touched)
-    lifted = 1e3 * float(heights[0].min())
-    start = say("started_above", height=lifted) if lifted > LIFTED else ""
+    lifted = float(heights[0].min())
+    start = say("started_above", height=1e3 * lifted) if lifted > LIFTED else ""
     rose = say("rose", rise=rise, start=start) if rise >= 0 else say("stayed_below", rise=-rise, start=start)
     told = launched(run, heights, flown[0][0]) if flown else []
-    told.append(say("went", way=1e3 * way, rose=rose))
+    lowest = say("rose_from_lowest", rise=1e3 * (_from_lowest(run, flights) or 0.0))
+    told.append(say("went", way=1e3 * way, rose=f"{rose} {lowest}"))
     lost = bounce_words(crater_losses(run, heights, apart=APART))
     stayed = say("stayed_in_crater" if lost else "stayed")
     flew = say("flew", count=len(flown), apart=1e3 * APART, longest=1e3 * flights.longest) if flown else stayed

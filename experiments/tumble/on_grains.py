@@ -316,7 +316,7 @@ class PlanarOnBed(PlatformOnBed[TumbleSettings, CoupledTumble, PlanarForecast]):
         bed.overlap_limit = run_limit(s.max_overlap)
         return in_lammps(
             bed, self.members(), s, self.progress, copies=self.copies, touch=TOUCH * self.weight / self.copies,
-            friction=s.spike_friction, restitution=s.spike_restitution, **self.layout(bed),
+            friction=s.spike_friction, restitution=s.spike_restitution, kept=self.kept, **self.layout(bed),
         )  # fmt: skip
 
     def check(self) -> None:

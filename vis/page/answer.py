@@ -12,7 +12,7 @@ from vis.page.numbers import quantity, split_spread
 from vis.page.page import Block, Page, Section, Tile, listing, table, text, write_template
 from vis.page.sentences import Sentences
 
-__all__ = ["MOST_ROWS", "answer", "without_unknown", "write_page"]
+__all__ = ["LIFTED", "MOST_ROWS", "answer", "without_unknown", "write_page"]
 
 say = Sentences(__package__)
 MINUS, NBSP = "\N{MINUS SIGN}", "\N{NO-BREAK SPACE}"

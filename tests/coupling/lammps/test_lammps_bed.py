@@ -8,17 +8,20 @@ import os
 import signal
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from coupling import BedGround, CoupledTumble, platform_members
+from coupling.ground import part_of
 from coupling.lammps import LammpsBed, LammpsEndedError, LammpsGround, LammpsMissingError, find_lammps
 from coupling.lammps.law import OVERLAP
 from coupling.members import Member
 from dem import Ball, Bed, Cylinder, Facing, Material, Polyhedron
 from dem.contact.law import pair_row
 from dem.grains.materials import material
+from experiments.grains.lammps import moved_to_lammps
 from rigid import Trial
 
 try:
@@ -292,6 +295,27 @@ def test_to_keep_the_state_changes_no_bit_and_a_restored_run_goes_on_within_a_pe
     # The dashpots of the first step see the velocities of its end: LAMMPS keeps no others in a restart file.
     again = pushed(one, body, 5)
     assert np.abs(again - after).max() < 0.01 * np.abs(after).max()
+
+
+def test_a_run_that_is_resumed_goes_on_at_once_as_if_its_grains_had_come_to_rest_again_first(bed, in_lammps):
+    one = in_lammps()
+    assert one.settle() > 0 and one.surface != bed.surface
+    body = with_spike(one)
+    pushed(one, body, 5)
+    kept = {f"ground.bed.{name}": value for name, value in one.state().items()}
+    after, told = [], []
+    for known in (None, kept):
+        moved = moved_to_lammps(bed, SimpleNamespace(ranks=1), SimpleNamespace(message=told.append), kept=known)
+        try:
+            assert (moved.surface, moved.packing_fraction) == (one.surface, one.packing_fraction)
+            body = with_spike(moved)
+            moved.restore(part_of(part_of(kept, "ground"), "bed"))
+            after.append(pushed(moved, body, 5))
+        finally:
+            moved.close()
+        rests = [said for said in told if "surface moved" in said]
+    assert len(rests) == 1 and told[-1] == rests[0]  # of the first alone
+    assert np.array_equal(*after) and np.abs(after[0]).max() > 0
 
 
 def test_a_grain_that_has_just_crossed_a_periodic_side_is_in_the_restored_state():

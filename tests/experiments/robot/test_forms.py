@@ -105,6 +105,16 @@ def test_a_robot_that_leaves_no_law_has_no_later_landing():
     assert not any("--duration" in words for words in forms_of(planned(), own, lambda _: own, sure={}).words)
 
 
+def test_laws_on_which_a_foot_sinks_deeper_than_the_bed_are_named():
+    plan = planned()
+    answers = {law: on_law(0.01 * place) for place, law in enumerate(other_laws(plan), 1)}
+    laws = forms_of(plan, on_law(0.005), lambda other: answers[named(other)], sure={})
+    (deeper,) = [words for words in with_grains(laws, on_law(0.01).answer, depth=0.055).words if "this bed" in words]
+    assert "55 mm" in deeper and [law for law in answers if law in deeper] == list(answers)[5:]
+    for depth in (None, 0.2):
+        assert not any("this bed" in words for words in with_grains(laws, on_law(0.01).answer, depth=depth).words)
+
+
 def named(plan):
     return ", ".join((plan.law, *plan.settings.ground_parameters))
 

@@ -10,9 +10,10 @@ from coupling.robot import FootForces, LawFeet, MujocoRobot, RobotRun, find_feet
 from experiments.grains.tracked_frames import HARDER, PlatformFrames
 from experiments.robot import experiment as robot
 from experiments.robot.feet import FEW, feet_quantities, feet_reached, heights_of, too_deep
+from experiments.robot.flight import find_flights
 from experiments.robot.on_grains import RobotFollowed
 from experiments.robot.plan import plan_robot
-from experiments.robot.result import RobotFrames
+from experiments.robot.result import RobotFrames, quantities_of
 from experiments.robot.settings import RobotSettings
 from experiments.runs.folder import read_series
 from rigid.spatial.quaternions import to_matrix
@@ -66,6 +67,18 @@ def test_clearance_counts_from_the_first_touch_and_each_foot_has_its_own(tmp_pat
     found = feet_quantities(reached)
     assert len(found) == 8 and found["clearance_largest_box"][0] == reached["box"]["clearance_largest"]
     assert found["sinkage_largest_egg"][0] == pytest.approx(run.feet[:, 1, -1].max())
+
+
+def test_the_rise_from_a_lowest_point_is_that_from_any_moment_to_a_later_one(tmp_path):
+    run = dropped(tmp_path, duration=0.3)
+    heights, z = heights_of(run), run.columns["z"]
+    flights = find_flights(run, heights)
+    found = quantities_of(run, heights, flights)
+    after = z[flights.touched :]
+    end = after[-1] + (flights.left[0] if flights.left else 0.0)
+    rises = [max(after[row:].max(), end) - after[row] for row in range(len(after))]
+    assert found["rise_from_lowest"]["value"] == pytest.approx(max(rises), abs=1e-12)
+    assert found["rise_from_lowest"]["value"] > max(found["highest"]["value"], 1e-3)
 
 
 def test_a_robot_of_one_foot_or_of_many_has_one_clearance_in_its_table():
