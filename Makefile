@@ -45,7 +45,7 @@ fuzz: $(VENV)/.installed-test  ## settings and campaigns drawn at random, 10,000
 	HEDGEBED_FUZZ=10000 HEDGEBED_FUZZ_KEPT=$(abspath $(FUZZED)) $(PYTEST) -m "long or not long" tests/faults/test_fuzz.py tests/faults/test_fuzz_computed.py $(ARGS)
 
 torture: $(VENV)/.installed-test  ## files damaged, 4,400 in all, disks filled, a cache taken away, experiments killed 50 times: resumed to the same bits
-	HEDGEBED_DAMAGES=200 $(PYTEST) -m "long or slow or not long" tests/faults/test_damage.py tests/faults/test_damaged_folders.py tests/faults/test_damaged_lammps.py tests/faults/test_disk.py $(ARGS)
+	HEDGEBED_DAMAGES=200 $(PYTEST) -m "long or slow or not long" tests/faults/test_damage.py tests/faults/test_damaged_folders.py tests/faults/test_damaged_checkpoints.py tests/faults/test_disk.py $(ARGS)
 	HEDGEBED_KILLS=50 HEDGEBED_KILLED_KEPT=$(abspath $(KILLED)) $(PYTEST) -m "long or slow" tests/faults/test_killed.py $(ARGS)
 
 tiers: $(VENV)/.installed-test  ## measure again how long each file of tests takes (tests/durations.toml; ARGS="FILE ..." for new ones)

@@ -138,14 +138,17 @@ def code_of(experiment: Experiment) -> str:
     return digest.hexdigest()[:16]
 
 
-def done_before(task: Task) -> Outcome | None:
-    """The outcome of a task whose folder is done; None where it is not, or where its result cannot be read."""
+def done_before(task: Task, tell: Callable[[str], None] | None = None) -> Outcome | None:
+    """The outcome of a task whose folder is done; None where it is not, or where its result cannot be read.
+
+    ``tell``: called with a sentence where a file of a run that was done is damaged or gone.
+    """
     if task.after is not None and task.after.missing(task.path):
         return None
-    return _run_before(task)
+    return _run_before(task, tell or _unsaid)
 
 
-def _run_before(task: Task) -> Outcome | None:
+def _run_before(task: Task, tell: Callable[[str], None]) -> Outcome | None:
     """The outcome of the run of a task, with or without what comes after it."""
     try:
         folder = RunFolder.open(task.path)
@@ -153,7 +156,10 @@ def _run_before(task: Task) -> Outcome | None:
             return None
         folder.read_result()
         text = (task.path / "result.json").read_text(encoding="utf-8")
-    except (OSError, ValueError):
+    except (OSError, ValueError) as error:
+        if task.path.is_dir():
+            said = file_words(error, f"a file below {task.path}") if isinstance(error, OSError) else str(error)
+            tell(f"{said}; the run is done again")
         return None
     return Outcome(task.name, text, processor_time=folder.processor_time)
 
@@ -184,7 +190,7 @@ def _with_after(task: Task, tell: Tell, shown: Progress | None) -> Outcome:
     """The run and what comes after it; what is there is read."""
     own = 1.0 if task.after is None else 1.0 - task.after.share
     told = _Told(lambda share: tell(own * share), shown)
-    outcome = _run_before(task) or _compute(task, _folder_of(task), told)
+    outcome = _run_before(task, _unsaid) or _compute(task, _folder_of(task), told)
     if task.after is not None and task.after.missing(task.path):
         silent, folder = _Told(lambda share: None, shown), RunFolder.open(task.path)
         task.after.make(task.settings, task.path, lambda share: tell(own + (1.0 - own) * share), silent)
@@ -215,7 +221,7 @@ def _compute(task: Task, folder: RunFolder, progress: Progress) -> Outcome:
             experiment.run(task.settings, folder.path, progress=progress)
         else:
             experiment.resume(folder.path, progress=progress)
-    outcome = _run_before(task)
+    outcome = _run_before(task, _unsaid)
     if outcome is None:
         raise RuntimeError(f"{task.path / 'result.json'} is not there after the run")
     return outcome

@@ -150,7 +150,8 @@ def run_all(
     done.
     """
     every = {one.task.name: one for one in planned}
-    before = {name: done for name, one in every.items() if (done := done_before(one.task)) is not None}
+    found = {name: done_before(one.task, progress.message) for name, one in every.items()}
+    before = {name: done for name, done in found.items() if done is not None}
     todo = {name: one for name, one in every.items() if name not in before}
     if before:
         progress.message(f"{len(before)} of {len(every)} runs are done already, {len(todo)} are to do")

@@ -122,6 +122,8 @@ def _pair(where: str, text: str, settings_class: type[BaseModel]) -> tuple[str, 
 
 
 def _check_key(where: str, key: str, settings_class: type[BaseModel]) -> None:
+    if not key:
+        raise ValueError(f"{where}: a column of its head has no name; expected the name of a setting")
     if key not in settings_class.model_fields:
         raise ValueError(f"{where}: {key} is no setting; {nearest(key, settings_class.model_fields)}")
 

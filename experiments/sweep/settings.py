@@ -6,7 +6,7 @@ from typing import Any, Literal, Self
 from pydantic import Field, field_validator, model_validator
 
 from experiments.runs.registry import EXPERIMENTS
-from experiments.runs.strict import Scheduler, SeedNumber, StrictSettings, Threads
+from experiments.runs.strict import Scheduler, SeedNumber, StrictSettings
 from rigid.checks import nearest
 from rigid.result import toml_value
 
@@ -47,7 +47,7 @@ class SweepSettings(StrictSettings):
     workers: int | None = Field(None, ge=1, le=1024)
     """Number of processes on this machine, each with one run at a time; 1 needs no dask; one for each core if not
     given."""
-    threads: Threads = None
+    threads: int | None = Field(None, ge=1, le=1024)
     """CPU threads of each run; the cores here shared out evenly, or 1 on a cluster, if not given."""
     scheduler: Scheduler = None
     members: str | None = Field(None, min_length=1)

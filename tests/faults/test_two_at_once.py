@@ -14,8 +14,8 @@ from pathlib import Path
 
 import pytest
 from faults.damaged_folders import CALIBRATE, CONVERGE, KINDS, ON_GRAINS, SWEEP, TUMBLE, Kind, case, patched
+from faults.test_damaged_checkpoints import CASE as IN_LAMMPS
 from faults.test_damaged_folders import files_of
-from faults.test_damaged_lammps import CASE as IN_LAMMPS
 from faults.test_killed import CASES
 
 from coupling.lammps import LammpsMissingError, find_lammps

@@ -154,6 +154,7 @@ def test_a_sweep_whose_worker_and_client_are_killed_ends_in_the_table_of_a_seria
         victim, left = awaited(lambda: busy(swept / "members", workers))
         victim.send_signal(signal.SIGKILL)
         victim.wait()
+        assert not (left / "result.json").exists()  # it was in the middle of this run
         awaited(lambda: len(done(swept)) >= 3)
         client.send_signal(signal.SIGKILL)
         client.wait()

@@ -71,7 +71,7 @@ def test_a_scheduler_beside_workers_is_refused_and_the_variable_replaces_it(monk
         assert Where.of(ConvergeSettings(**given)) == Where("tcp://there:2")
 
 
-def test_runs_come_in_their_order_each_once_and_what_is_done_comes_first(tmp_path):
+def test_runs_come_in_their_order_each_once_and_what_is_done_comes_first(tmp_path, monkeypatch):
     first, second, third = tumbles(tmp_path, [0.2, 0.15, 0.18])
     begun, progress = [], Progress()
     run_all([second], where=Where(workers=1), progress=progress)
@@ -81,8 +81,13 @@ def test_runs_come_in_their_order_each_once_and_what_is_done_comes_first(tmp_pat
     assert names == [[second.task.name], [first.task.name], [third.task.name]]
     assert set(outcomes) == {one.task.name for one in planned} and not any(one.fault for one in outcomes.values())
     assert progress.stage_fraction == 1.0
+    said = []
+    monkeypatch.setattr(progress, "message", said.append)
+    lost = first.task.path / "result.json"
+    lost.write_bytes(lost.read_bytes()[:100])
     again = run_all(planned, where=Where(workers=1), progress=progress)
     assert {name: one.result for name, one in again.items()} == {name: one.result for name, one in outcomes.items()}
+    assert len([words for words in said if str(lost) in words and "done again" in words]) == 1
 
 
 @dataclass(frozen=True)

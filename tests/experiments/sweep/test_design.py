@@ -112,6 +112,7 @@ def test_what_cannot_be_swept_is_refused_by_key_and_value(given, words):
     [
         ("torque\n", ("no rows",)),
         ("torqe\n1\n", ("torqe", "torque")),
+        ("torque,\n0.1,2\n", ("rows.csv", "no name")),
         ("torque,torque\n1,2\n", ("twice",)),
         ("torque,mu_s\n0.1,0.4\n0.2\n", ("rows.csv:3", "1 cells", "2")),
         ("rig\n0.01\n", ("rig", "fixed")),

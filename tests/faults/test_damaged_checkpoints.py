@@ -1,7 +1,8 @@
-"""Checkpoints of grains in LAMMPS that are cut off or have a wrong bit: the run goes on from the one before.
+"""Checkpoints of a push into grains that are cut off or have a wrong bit: the run goes on from the one before.
 
-LAMMPS' restart file is one array of a checkpoint of ours, a zip file with a checksum for each array. Resumed twice from
-the same checkpoint on one rank, LAMMPS has the same numbers, so the series tells from which checkpoint a run went on.
+On our bed it ends in the bits of the run that was never stopped. LAMMPS' restart file is one array of a checkpoint of
+ours, a zip file with a checksum for each array. Resumed twice from the same checkpoint on one rank, LAMMPS has the same
+numbers, so the series tells from which checkpoint a run went on.
 """
 
 import os
@@ -22,9 +23,7 @@ from experiments.cli.main import main
 from experiments.runs import folder, whole_runs
 
 DAMAGES = int(os.environ.get("HEDGEBED_DAMAGES", "3"))
-CASE = GRAINS.replace("depth = 0.006", "depth = 0.004") + """
-ground = "lammps"
-ranks = 1
+ON_OUR_BED = GRAINS.replace("depth = 0.006", "depth = 0.004") + """
 grain = 0.004
 seeds = [1]
 speeds = [0.4]
@@ -32,6 +31,13 @@ hold = 0.0
 drop_speeds = []
 young = 2e7
 """  # fmt: skip
+CASE = (
+    ON_OUR_BED
+    + """
+ground = "lammps"
+ranks = 1
+"""
+)
 NEWEST, BEFORE = (Path("run/checkpoint/seed1-driven-0.4.npz" + end) for end in ("", ".before"))
 SERIES = Path("run/series/seed1-driven-0.4.csv")
 
@@ -57,16 +63,32 @@ def stopped(tmp_path_factory):
         find_lammps()
     except LammpsMissingError as missing:
         pytest.skip(str(missing))
-    home = tmp_path_factory.mktemp("whole") / "stopped"
+    return stopped_twice(CASE, tmp_path_factory.mktemp("whole") / "stopped")
+
+
+def stopped_twice(text, home):
+    """`home`, with the run of a case that was stopped twice in its push."""
     home.mkdir()
     with pytest.MonkeyPatch.context() as patch, stopped_after(40):
         patch.setattr(whole_runs, "write_report", lambda *given: None)
         patch.setenv("HEDGEBED_CACHE", str(home.parent / "cache"))
         patch.chdir(home)
-        assert main(["penetrate", case(CASE), "--out", "run", "--quiet"]) == 3
+        assert main(["penetrate", case(text), "--out", "run", "--quiet"]) == 3
         assert main(["resume", "run", "--quiet"]) == 3
         assert NEWEST.exists() and BEFORE.exists() and not SERIES.exists()
     return home
+
+
+@pytest.fixture(scope="module")
+def on_our_bed(tmp_path_factory):
+    """The same on our bed, and the series of the run that is not stopped."""
+    home = stopped_twice(ON_OUR_BED, tmp_path_factory.mktemp("ours") / "stopped")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(whole_runs, "write_report", lambda *given: None)
+        patch.setenv("HEDGEBED_CACHE", str(home.parent / "cache"))
+        patch.chdir(home.parent)
+        assert main(["penetrate", case(ON_OUR_BED), "--out", "run", "--quiet"]) == 0
+    return home, (home.parent / SERIES).read_bytes()
 
 
 def resumed(stopped, home, change):
@@ -103,6 +125,17 @@ def series(stopped, tmp_path_factory):
 def cut(path):
     """Leave half of a file."""
     path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", range(DAMAGES))
+def test_a_damaged_checkpoint_on_our_bed_is_named_and_the_run_ends_in_the_same_bits(seed, on_our_bed, tmp_path):
+    home, whole = on_our_bed
+    rng = random.Random(seed)
+    found, said = resumed(home, tmp_path / "one", lambda: damaged(NEWEST, rng))
+    assert found == whole, said
+    found, said = resumed(home, tmp_path / "both", lambda: [cut(NEWEST), damaged(BEFORE, rng)])
+    assert found == whole and f"{NEWEST} is damaged" in said
 
 
 @pytest.mark.long
