@@ -14,6 +14,6 @@ from .process import INSTALL, LammpsEndedError, LammpsMissingError, check_ranks,
 from .regions import check_count, check_plane
 
 __all__ = [
-    "INSTALL", "FreeLammpsBed", "LammpsBed", "LammpsEndedError", "LammpsGround", "LammpsMissingError", "OutOfPlaneError", "check_count",
-    "check_plane", "check_ranks", "find_lammps",
+    "INSTALL", "FreeLammpsBed", "LammpsBed", "LammpsEndedError", "LammpsGround", "LammpsMissingError",
+    "OutOfPlaneError", "check_count", "check_plane", "check_ranks", "find_lammps",
 ]  # fmt: skip

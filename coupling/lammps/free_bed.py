@@ -133,7 +133,7 @@ class FreeLammpsBed(LammpsBed):
         ids = rows[:, 0].astype(int)
         reach = margin - float(self.radius.max()) + duration * np.linalg.norm(rows[:, 4:7], axis=1)
         chosen = ids[self._touches.gaps(rows[:, 1:4], duration) < self.radius[ids - 1] + reach]
-        self._lammps.tell(["group near clear", *([f"group near id {' '.join(map(str, chosen))}"] if len(chosen) else [])])
+        self._lammps.tell(["group near clear", *(f"group near id {some}" for some in _in_parts(chosen))])
         return bool(len(chosen))
 
     def _near(self) -> Vector:
@@ -200,6 +200,11 @@ class FreeLammpsBed(LammpsBed):
         self._touches.restore(*(np.asarray(state[f"free_{name}"]) for name in ("poses", "keys", "springs")))
         self._turning = np.array(state["free_turning"], dtype=float).reshape(-1, 4)
         super().restore(state)
+
+
+def _in_parts(ids: Vector, most: int = 100) -> list[str]:
+    """Numbers for commands, of so many at most."""
+    return [" ".join(map(str, ids[k : k + most])) for k in range(0, len(ids), most)]
 
 
 def _pushed(values: Vector) -> str:

@@ -29,6 +29,7 @@ _WHICH = ti.types.ndarray(dtype=ti.i32, ndim=1)
 @ti.kernel
 def _move(engine: ti.template(), dt: float):
     """Let all bodies go on for one step, as the bed lets them."""
+    ti.loop_config(serialize=True)
     for _ in range(1):
         for b in range(1, engine.body_count[None]):
             engine.body_position[b] = engine.body_position[b] + dt * engine.body_velocity[b]
@@ -38,13 +39,13 @@ def _move(engine: ti.template(), dt: float):
 @ti.kernel
 def _gaps(engine: ti.template(), points: _NUMBERS, found: _NUMBERS, shapes: ti.template()):
     """From a point to the nearest body [m]."""
+    ti.loop_config(serialize=True)
     for i in range(points.shape[0]):
         x = ti.cast(ti.Vector([points[i, 0], points[i, 1], points[i, 2]]), engine.real)
         nearest = ti.cast(1e30, engine.real)
         for b in range(1, engine.body_count[None]):
             if engine.from_body(b, x).norm() - engine.body_extent[b] < nearest:
-                distance, n, curvature, arm = engine.nearest(b, x, FAR, shapes, True)
-                nearest = ti.min(nearest, distance)
+                nearest = ti.min(nearest, engine.nearest(b, x, FAR, shapes, True)[0])
         found[i, 0] = nearest
 
 
@@ -57,6 +58,7 @@ def _push(
 
     `found`: force, torque, share of the load and overlap over diameter of the grain; `sums`: of each body.
     """
+    ti.loop_config(serialize=True)
     for _ in range(1):
         for b in range(sums.shape[0]):
             engine.pushes[0, b] = ti.Vector.zero(engine.real, 6)
@@ -75,14 +77,14 @@ def _push(
             engine.near_body[s] = b
             found[s, 7] = engine.push_near(0, s, dt, 1, ti.cast(1.0, engine.real), shapes, balance)
             x = engine.position[s]
-            distance, n, curvature, arm = engine.nearest(b, x.xyz, x.w, shapes, False)
+            near = engine.nearest(b, x.xyz, x.w, shapes, False)  # distance, normal, curvature, arm
             for k in ti.static(range(4)):
                 springs[s, k] = engine.near_slide[s][k]
             for k in ti.static(range(3)):
                 springs[s, 4 + k] = engine.near_roll[s][k]
                 found[s, k] = engine.force[s][k]
                 found[s, 3 + k] = engine.torque[s][k]
-            found[s, 6] = ti.select(found[s, 7] != 0.0, distance * n.dot(engine.force[s]), 0.0)
+            found[s, 6] = ti.select(found[s, 7] != 0.0, near[0] * near[1].dot(engine.force[s]), 0.0)
         for b in range(sums.shape[0]):
             for k in ti.static(range(6)):
                 sums[b, k] = engine.pushes[0, b][k]
@@ -121,54 +123,59 @@ class BodyTouches:
         )  # fmt: skip
         self.period = np.array(like.size[:2], dtype=float)
         self._keys, self._springs = np.zeros(0, dtype=np.int64), np.zeros((0, 7))
+        self._places, self._speeds, self._extents = np.zeros((1, 3)), np.zeros((1, 6)), np.zeros(1)
 
     @property
     def count(self) -> int:
         """How many bodies there are, the floor, which touches nothing here, included."""
-        return int(self._bed.engine.body_count[None])
+        return len(self._extents)
 
     def add_body(self, shape: Any, position: Sequence[float], facing: Facing) -> int:
         """As `dem.Bed.add_body`, which says what is refused."""
-        return int(self._bed.place_body(shape, position, facing))
+        body = int(self._bed.place_body(shape, position, facing))
+        self._places = np.vstack([self._places, position])
+        self._speeds = np.vstack([self._speeds, np.zeros(6)])
+        self._extents = np.append(self._extents, float(self._bed.engine.body_extent[body]))
+        return body
 
-    def move(self, bodies: Sequence[int], **given: Vector) -> None:
+    def move(
+        self, bodies: Sequence[int], *, positions: Vector, velocities: Vector, turns: Vector, spins: Vector
+    ) -> None:
         """As `dem.Bed.move_bodies`."""
-        self._bed.move_bodies(bodies, **given)
+        self._bed.move_bodies(bodies, positions=positions, velocities=velocities, turns=turns, spins=spins)
+        self._places[bodies], self._speeds[bodies] = positions, np.hstack([velocities, spins])
 
     def poses(self) -> Vector:
         """Position, velocity, turn and spin of all bodies, shape [body, 13]."""
-        names = ("body_position", "body_velocity", "body_turn", "body_spin")
-        return np.hstack([self._bed.engine.read(name)[: self.count] for name in names]).astype(float)
+        turns = self._bed.engine.read("body_turn")[: self.count].astype(float)
+        return np.hstack([self._places, self._speeds[:, :3], turns, self._speeds[:, 3:]])
 
     def go_on(self, dt: float) -> None:
         """Let the bodies go on for this time step [s]."""
         _move(self._bed.engine, dt)
+        self._places[1:] += dt * self._speeds[1:, :3]
 
     def boxes(self, duration: float, margin: float) -> Vector:
         """Lower and upper corner of a box around each body in the next ``duration`` [s], shape [body, 2, 3]."""
-        poses, extent = self.poses()[1:], self._bed.engine.read("body_extent")[1 : self.count].astype(float)
-        travel = duration * np.abs(poses[:, 3:6]) + (extent + margin)[:, None]
-        return np.stack([poses[:, :3] - travel, poses[:, :3] + travel], axis=1)
+        travel = duration * np.abs(self._speeds[1:, :3]) + (self._extents[1:] + margin)[:, None]
+        return np.stack([self._places[1:] - travel, self._places[1:] + travel], axis=1)
 
     def gaps(self, points: Vector, duration: float) -> Vector:
         """From points [m], shape [n, 3], to where the nearest body may be within ``duration`` [s], shape [n]."""
         found = np.zeros((len(points), 1))
         if len(points):
             _gaps(self._bed.engine, np.ascontiguousarray(points), found, self._bed.engine.shapes)
-        poses, extent = self.poses()[1:], self._bed.engine.read("body_extent")[1 : self.count].astype(float)
-        speed = np.linalg.norm(poses[:, 3:6], axis=1) + extent * np.linalg.norm(poses[:, 10:], axis=1)
-        return np.asarray(found[:, 0] - duration * speed.max(initial=0.0))
+        speed, spin = (np.linalg.norm(part, axis=1) for part in (self._speeds[:, :3], self._speeds[:, 3:]))
+        return np.asarray(found[:, 0] - duration * float((speed + self._extents * spin).max()))
 
     def push(self, ids: Vector, grains: Vector, dt: float) -> Touched:
         """What the bodies do to these grains in a step of ``dt`` [s], with the velocities half a step behind.
 
         ``ids``: rising, shape [n]; ``grains``: as of `_push`, shape [n, 11]. Springs of contacts with others end.
         """
-        places, e = self.poses()[:, :3], self._bed.engine
-        extent = e.read("body_extent")[: self.count].astype(float)
-        away = grains[:, None, :3] - places[None]
+        e, away = self._bed.engine, grains[:, None, :3] - self._places
         away[..., :2] -= self.period * np.round(away[..., :2] / self.period)
-        near = np.linalg.norm(away, axis=2) < extent + _REACH * grains[:, 3, None]
+        near = np.linalg.norm(away, axis=2) < self._extents + _REACH * grains[:, 3, None]
         near[:, 0] = False  # the floor
         rows, bodies = np.nonzero(near)
         keys, springs = ids[rows].astype(np.int64) * MOST_BODIES + bodies, np.zeros((len(rows), 7))
@@ -200,7 +207,7 @@ class BodyTouches:
         rows = np.asarray(poses, dtype=float)
         if len(rows) != self.count:
             raise ValueError(f"the state has {len(rows) - 1} bodies, this bed has {self.count - 1}")
-        parts = ("positions", rows[:, :3]), ("velocities", rows[:, 3:6]), ("turns", rows[:, 6:10])
-        self.move(range(self.count), **dict(parts), spins=rows[:, 10:])
+        position, velocity, turn, spin = np.split(rows, [3, 6, 10], axis=1)
+        self.move(range(self.count), positions=position, velocities=velocity, turns=turn, spins=spin)
         self._keys = np.array(keys, dtype=np.int64)
         self._springs = np.array(springs, dtype=float).reshape(-1, 7)

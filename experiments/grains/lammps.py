@@ -53,11 +53,12 @@ def check_lammps(settings: Any) -> None:
             raise ValueError(f"ground = 'lammps': {error}") from None
 
 
-def moved_to_lammps(bed: Any, settings: Any, progress: "Progress", *, begin: float = 0.0) -> Any:
-    """The grains of a prepared bed as a `coupling.lammps.LammpsBed`, at rest there."""
-    from coupling.lammps import LammpsBed
+def moved_to_lammps(bed: Any, settings: Any, progress: "Progress", *, begin: float = 0.0, free: bool = False) -> Any:
+    """The grains of a prepared bed as a `coupling.lammps.LammpsBed`, at rest there; ``free``: for bodies that turn out
+    of the plane of x and z."""
+    from coupling.lammps import FreeLammpsBed, LammpsBed
 
-    moved = LammpsBed(bed, ranks=settings.ranks or 1, begin=begin)
+    moved = (FreeLammpsBed if free else LammpsBed)(bed, ranks=settings.ranks or 1, begin=begin)
     said = time.monotonic()
 
     def tell(taken: float, energy: float) -> None:
@@ -74,9 +75,10 @@ def moved_to_lammps(bed: Any, settings: Any, progress: "Progress", *, begin: flo
 
 
 def in_lammps(
-    bed: Any, body: Any, settings: Any, progress: "Progress", *, begin: float = 0.0, **options: Any
+    bed: Any, body: Any, settings: Any, progress: "Progress", *, begin: float = 0.0, free: bool = False, **options: Any
 ) -> "BedGround":
     """A spike or members on the grains of a prepared bed in LAMMPS; `options`: of `BedGround`."""
     from coupling.lammps import LammpsGround
 
-    return LammpsGround(moved_to_lammps(bed, settings, progress, begin=begin), body, begin=begin, **options)
+    moved = moved_to_lammps(bed, settings, progress, begin=begin, free=free)
+    return LammpsGround(moved, body, begin=begin, **options)
