@@ -4,7 +4,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from experiments.grains.lammps import ON_GRAINS, lammps_fault
+from experiments.grains.lammps import ON_GRAINS, RANKS, lammps_fault
 from experiments.grains.settings import GrainsSettings
 from experiments.platform.settings import NotNegative, Positive
 from rigid.checks import nearest
@@ -32,6 +32,7 @@ class SpatialSettings(GrainsSettings):
     """Surface: steel, brick, sand, sand-weak, jsc1a or jsc1a-heights; brick if not given."""
     ground: str = "spring-damper"
     """Law of the force of the ground: spring-damper, bed (of grains) or lammps (a bed whose grains are in LAMMPS)."""
+    ranks: int | None = Field(None, ge=1, le=4096, description=RANKS)
     stiffness: Positive | None = None
     """Stiffness K under one spike [N/m]; if not given, half of the surface's, which is for a row of two."""
     damping: NotNegative | None = None
