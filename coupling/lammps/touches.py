@@ -22,8 +22,6 @@ Vector = np.ndarray
 ROWS = 256  # Contacts of one call of the kernel; more take several calls
 FAR = 1.0  # Farther from a body than this no distance to it is known [m]
 _REACH = 1.25  # Up to how many radii from a body a grain is tried, for cohesion that holds across a gap [1]
-_NUMBERS = ti.types.ndarray(dtype=ti.f64, ndim=2)
-_WHICH = ti.types.ndarray(dtype=ti.i32, ndim=1)
 
 
 @ti.kernel
@@ -37,7 +35,12 @@ def _move(engine: ti.template(), dt: float):
 
 
 @ti.kernel
-def _gaps(engine: ti.template(), points: _NUMBERS, found: _NUMBERS, shapes: ti.template()):
+def _gaps(
+    engine: ti.template(),
+    points: ti.types.ndarray(dtype=ti.f64, ndim=2),
+    found: ti.types.ndarray(dtype=ti.f64, ndim=2),
+    shapes: ti.template(),
+):
     """From a point to the nearest body [m]."""
     ti.loop_config(serialize=True)
     for i in range(points.shape[0]):
@@ -51,9 +54,16 @@ def _gaps(engine: ti.template(), points: _NUMBERS, found: _NUMBERS, shapes: ti.t
 
 @ti.kernel
 def _push(
-    engine: ti.template(), bodies: _WHICH, grains: _NUMBERS, springs: _NUMBERS, found: _NUMBERS, sums: _NUMBERS,
-    dt: float, shapes: ti.template(), balance: ti.template(),
-):  # fmt: skip
+    engine: ti.template(),
+    bodies: ti.types.ndarray(dtype=ti.i32, ndim=1),
+    grains: ti.types.ndarray(dtype=ti.f64, ndim=2),
+    springs: ti.types.ndarray(dtype=ti.f64, ndim=2),
+    found: ti.types.ndarray(dtype=ti.f64, ndim=2),
+    sums: ti.types.ndarray(dtype=ti.f64, ndim=2),
+    dt: float,
+    shapes: ti.template(),
+    balance: ti.template(),
+):
     """One contact a row, in their order: `grains` are place, radius, velocity, mass and spin, `springs` the history.
 
     `found`: force, torque, share of the load and overlap over diameter of the grain; `sums`: of each body.
