@@ -52,10 +52,10 @@ def single(place=(0.015, 0.015, 0.04)):
 @pytest.mark.parametrize(
     ("name", "spin"),
     [
-        ("ball", (90.0, 0.0, 0.0)),
-        ("ball", (0.0, 90.0, 0.0)),
         ("ball", (0.0, 0.0, 90.0)),
-        *((name, (30.0, -50.0, 40.0)) for name in ("box", "capsule", "polyhedron")),
+        pytest.param("ball", (90.0, 0.0, 0.0), marks=pytest.mark.long),
+        pytest.param("ball", (0.0, 90.0, 0.0), marks=pytest.mark.long),
+        *(pytest.param(name, (30.0, -50.0, 40.0), marks=pytest.mark.long) for name in ("box", "capsule", "polyhedron")),
     ],
 )
 def test_a_grain_on_a_body_that_spins_about_any_axis_has_the_force_and_motion_of_our_bed(name, spin, beds):
