@@ -122,7 +122,9 @@ def test_feet_are_regions_of_lammps_where_joints_hold_them_in_the_plane(given, h
     file.write_text(RAIL.format(**{"kind": "box", "quat": "1 0 0 0", "joint": UP} | given))
     settings = RobotSettings(**ON_BED | {"model": str(file), "ground": "lammps", "duration": 0.05, "height": None})
     made = {}
-    monkeypatch.setattr("experiments.robot.on_grains.moved_to_lammps", lambda bed, *_, **given: made.update(given) or bed)
+    monkeypatch.setattr(
+        "experiments.robot.on_grains.moved_to_lammps", lambda bed, *_, **given: made.update(given) or bed
+    )
     monkeypatch.setattr("experiments.robot.on_grains.LammpsFeet", lambda *_, **__: None)
     run = RobotOnBed(settings, plan_robot(settings))
     run.progress = None
