@@ -87,7 +87,7 @@ def _push(
             engine.near_body[s] = b
             found[s, 7] = engine.push_near(0, s, dt, 1, ti.cast(1.0, engine.real), shapes, balance)
             x = engine.position[s]
-            near = engine.nearest(b, x.xyz, x.w, shapes, False)  # distance, normal, curvature, arm
+            near = engine.nearest(b, x.xyz, _REACH * x.w, shapes, False)  # distance, normal, curvature, arm
             for k in ti.static(range(4)):
                 springs[s, k] = engine.near_slide[s][k]
             for k in ti.static(range(3)):
