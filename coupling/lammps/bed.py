@@ -45,6 +45,7 @@ class LammpsBed:
     """
 
     precision = "float64"
+    more_loads = ""  # Loads of grains beside those by floor and bodies, in LAMMPS' words
 
     def __init__(self, bed: Bed, *, ranks: int, begin: float = 0.0) -> None:
         bodies = int(bed.state()["numbers"][1])
@@ -67,7 +68,7 @@ class LammpsBed:
         self._rows = [bed.state()["body_pair"][FLOOR].astype(float)]  # Pair parameters of floor and bodies
         self._grain_row = pair_row(self.material, tensile=self.tensile)
         self._mean = MeanContact.of(self.radius, self.mass)
-        self._classes = RollingClasses(self._grain_row, self.material, self.radius, self.mass)
+        self._classes = RollingClasses(self._grain_row, self.material, self.radius, self.mass, more=self.more_loads)
         self._followed = 0  # Step from which on LAMMPS follows the loads of the grains
         self._bodies: list[MovingBody] = []
         self._sums, self._reactions = np.zeros(0), np.zeros((1, 6))

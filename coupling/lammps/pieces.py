@@ -1,7 +1,8 @@
 """Pieces of bodies, each of which is one region of LAMMPS: primitives here, those of polyhedra in `polyhedra`.
 
 A region turns about one axis, which LAMMPS takes as a constant, and has the velocity of that turning. Here the axis is
-y, across the plane of motion. A turning about two axes would need regions that move inside of regions.
+y, across the plane of motion. A turning about two axes would need regions that move inside of regions; `free_bed` has
+such bodies without regions.
 """
 
 import math
@@ -30,7 +31,7 @@ class OutOfPlaneError(ValueError):
     def __init__(self) -> None:
         super().__init__(
             "this body turns out of the plane of motion, x and z: LAMMPS' regions turn about one constant axis, which "
-            "is y here; the ground `bed` takes such a body"
+            "is y here; a `FreeLammpsBed`, or the ground `bed`, takes such a body"
         )
 
 

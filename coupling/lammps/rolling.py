@@ -45,10 +45,13 @@ class RollingClasses:
     """The classes of a bed: their springs, and the commands by which grains in LAMMPS change them.
 
     ``row``: pair parameters of two grains. ``radii``, ``masses`` [m, kg]: of the grains, shape [grain_count] both.
+    ``more``: what else presses a grain, in LAMMPS' words.
     """
 
-    def __init__(self, row: Sequence[float], material: Material, radii: np.ndarray, masses: np.ndarray) -> None:
-        self.row, self.material = row, material
+    def __init__(
+        self, row: Sequence[float], material: Material, radii: np.ndarray, masses: np.ndarray, *, more: str = ""
+    ) -> None:
+        self.row, self.material, self.more = row, material, more
         self.two_e, pi_w = float(row[0]), float(row[-1])
         self.mass, radius = 0.5 * float(np.mean(masses)), float(np.mean(radii))
         # Cubes of contact radii [m3]: of the first class, by a^2 = R* d, and of cohesion's load.
@@ -108,7 +111,7 @@ class RollingClasses:
             return []
         arms = ("x", 5), ("y", 6), ("z", 7)
         work = "+".join(f"({x}-f_{wall}[{k}])*f_{wall}[{k - 3}]" for wall in ["floor", *names] for x, k in arms)
-        return [f"variable walls atom {work}"]
+        return [f"variable walls atom {work}{self.more}"]
 
     def runs(self, begin: int, steps: int, since: int) -> list[str]:
         """The commands of ``steps`` time steps from step ``begin``, with the changes of type among them.

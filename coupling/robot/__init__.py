@@ -11,7 +11,7 @@ from .bed_feet import BedFeet
 from .body import MujocoRobot
 from .feet import Foot, Part, find_feet
 from .foot_forces import FootForces
-from .lammps_feet import LammpsFeet, refuse_in_lammps
+from .lammps_feet import LammpsFeet, by_regions
 from .law_feet import LawFeet
 from .models import LostRobotError, load_model
 from .run import RobotRun
@@ -20,5 +20,5 @@ from .stability import check_exchange
 
 __all__ = [
     "BedFeet", "Foot", "FootForces", "LammpsFeet", "LawFeet", "LostRobotError", "MujocoRobot", "Part", "RobotRun",
-    "check_exchange", "find_feet", "foot_matrices", "law_under_feet", "load_model", "refuse_in_lammps", "sole_of",
+    "by_regions", "check_exchange", "find_feet", "foot_matrices", "law_under_feet", "load_model", "sole_of",
 ]  # fmt: skip

@@ -1,4 +1,4 @@
-"""Grains in LAMMPS under the feet of a robot that moves in the plane: `LammpsFeet`."""
+"""Grains in LAMMPS under the feet of a robot: `LammpsFeet`."""
 
 from dataclasses import asdict
 from functools import partial
@@ -16,17 +16,17 @@ from .body import MujocoRobot
 from .distances import distances
 from .models import LostRobotError
 
-__all__ = ["LammpsFeet", "refuse_in_lammps"]
+__all__ = ["LammpsFeet", "by_regions"]
 
 STILL = 1e-9  # Turning about another axis than y over that of a joint [1]
 
 
 class LammpsFeet(BedFeet, LammpsGround):
-    """A `coupling.lammps.LammpsBed` under the feet of a robot; parameters as of `BedFeet`.
+    """A bed in LAMMPS under the feet of a robot; parameters as of `BedFeet`.
 
-    Feet are made of spheres, capsules, cylinders, boxes and convex meshes, and turn about y alone: LAMMPS' regions have
-    one constant axis. A grain in the corner of two geoms of a foot touches both; on a `dem.Bed` it touches the nearest.
-    Of energies see `LammpsGround`.
+    On a `coupling.lammps.LammpsBed` feet are made of spheres, capsules, cylinders, boxes and convex meshes, and turn
+    about y alone: LAMMPS' regions have one constant axis. There a grain in the corner of two geoms of a foot touches
+    both; on a `dem.Bed` it touches the nearest. A `FreeLammpsBed` takes any feet. Of energies see `LammpsGround`.
     """
 
     repeatable = False
@@ -70,30 +70,19 @@ class LammpsFeet(BedFeet, LammpsGround):
         return [(body, partial(distances, self._ruler, shape)) for body, shape in self._shapes]
 
 
-def refuse_in_lammps(robot: MujocoRobot) -> None:
-    """Raise ValueError, naming it, for a geom that LAMMPS has no region for, and a foot that can leave the plane."""
+def by_regions(robot: MujocoRobot) -> bool:
+    """Whether all feet can be regions of LAMMPS (`coupling.lammps.LammpsBed`), which turn about y alone.
+
+    Otherwise, as with a free root, an askew foot or a shape that LAMMPS has no region for, they need a
+    `coupling.lammps.FreeLammpsBed`.
+    """
     pieces = []
     for foot, turn in zip(robot.feet, robot.pose.turn.reshape(-1, 4), strict=True):
-        out_of_plane = np.abs(robot.jacobian(foot.body)[1][[0, 2]]).max(axis=0) > STILL
-        if out_of_plane.any():
-            joint = robot.model.joint(int(robot.model.dof_jntid[np.argmax(out_of_plane)]))
-            raise ValueError(
-                f"feet: the joint {joint.name or joint.id!r} can turn {foot.name!r} out of the plane of x and z; in "
-                f"LAMMPS a foot turns about y alone: ground = 'bed' takes this robot"
-            )
-        for part in foot.parts:
-            try:
-                pieces += check_plane(part.shapes, turn)
-            except OutOfPlaneError:
-                raise ValueError(
-                    f"feet: {part.name!r} stands askew: in LAMMPS an axis of it lies in the plane of x and z, or along "
-                    f"y; ground = 'bed' takes it"
-                ) from None
-            except ValueError as error:
-                raise ValueError(
-                    f"feet: {part.name!r} is of the kind {part.kind}, which ground = 'bed' alone takes here: {error}"
-                ) from None
-    try:
-        check_count(pieces)
-    except ValueError as error:
-        raise ValueError(f"feet: {error}") from None
+        if (np.abs(robot.jacobian(foot.body)[1][[0, 2]]) > STILL).any():
+            return False
+        try:
+            pieces += [piece for part in foot.parts for piece in check_plane(part.shapes, turn)]
+            check_count(pieces)
+        except ValueError:
+            return False
+    return True

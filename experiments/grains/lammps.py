@@ -57,15 +57,17 @@ def check_lammps(settings: Any) -> None:
 
 
 def moved_to_lammps(
-    bed: Any, settings: Any, progress: "Progress", *, begin: float = 0.0, kept: "State | None" = None
-) -> Any:
+    bed: Any, settings: Any, progress: "Progress", *, begin: float = 0.0, free: bool = False,
+    kept: "State | None" = None,
+) -> Any:  # fmt: skip
     """The grains of a prepared bed as a `coupling.lammps.LammpsBed`, at rest there.
 
-    ``kept``: the checkpoint of a run that is restored next. It has the grains, which need not come to rest first.
+    ``free``: for bodies that turn out of the plane of x and z. ``kept``: the checkpoint of a run that is restored next.
+    It has the grains, which need not come to rest first.
     """
-    from coupling.lammps import LammpsBed
+    from coupling.lammps import FreeLammpsBed, LammpsBed
 
-    moved = LammpsBed(bed, ranks=settings.ranks or 1, begin=begin)
+    moved = (FreeLammpsBed if free else LammpsBed)(bed, ranks=settings.ranks or 1, begin=begin)
     if kept is not None:
         moved.take_surface(part_of(part_of(kept, "ground"), "bed"))
         return moved
@@ -85,11 +87,12 @@ def moved_to_lammps(
 
 
 def in_lammps(
-    bed: Any, body: Any, settings: Any, progress: "Progress", *, begin: float = 0.0, kept: "State | None" = None,
-    **options: Any,
+    bed: Any, body: Any, settings: Any, progress: "Progress", *, begin: float = 0.0, free: bool = False,
+    kept: "State | None" = None, **options: Any,
 ) -> "BedGround":  # fmt: skip
-    """A spike or members on the grains of a prepared bed in LAMMPS; `kept`: as of `moved_to_lammps`; `options`: of
-    `BedGround`."""
+    """A spike or members on the grains of a prepared bed in LAMMPS; `free`, `kept`: as of `moved_to_lammps`;
+    `options`: of `BedGround`."""
     from coupling.lammps import LammpsGround
 
-    return LammpsGround(moved_to_lammps(bed, settings, progress, begin=begin, kept=kept), body, begin=begin, **options)
+    moved = moved_to_lammps(bed, settings, progress, begin=begin, free=free, kept=kept)
+    return LammpsGround(moved, body, begin=begin, **options)

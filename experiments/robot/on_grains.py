@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from coupling.members import Member
 from coupling.poses import Vector as Array
-from coupling.robot import BedFeet, LammpsFeet, MujocoRobot, RobotRun, refuse_in_lammps
+from coupling.robot import BedFeet, LammpsFeet, MujocoRobot, RobotRun, by_regions
 from coupling.robot.soles import plan_area
 from coupling.robot.stability import ExpectedBed, check_exchange
 from dem import Bed
@@ -335,8 +335,6 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
                 across, most = self.widths[foot.name] / s.grain, self.widths[foot.name] / FEWEST_ACROSS
                 raise ValueError(say("small_foot", s=s, name=foot.name, width=self.widths[foot.name], across=across,
                                      fewest=FEWEST_ACROSS, most=most))  # fmt: skip
-        if s.ground == "lammps":
-            refuse_in_lammps(self._robot)
         if self._robot.clearance < s.grain * (1 - 1e-9):
             raise ValueError(say("low_start", s=s, clearance=self._robot.clearance))
         if not self.gravity > 0:
@@ -415,7 +413,8 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
         s, make = self.settings, BedFeet
         if s.ground == "lammps":
             bed.overlap_limit = run_limit(s.max_overlap)
-            bed, make = moved_to_lammps(bed, s, self.progress, kept=self.kept), LammpsFeet
+            free = not by_regions(self._robot)
+            bed, make = moved_to_lammps(bed, s, self.progress, free=free, kept=self.kept), LammpsFeet
         return make(
             bed, self._robot.feet, touch=1e-3 * self.weight, friction=s.spike_friction,
             restitution=s.spike_restitution, **self.layout(bed),

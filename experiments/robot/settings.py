@@ -53,8 +53,8 @@ class RobotSettings(GrainsSettings):
     ground: str = DEFAULT
     """What computes the surface's force: a surface law (spring-damper, hunt-crossley, power, power-irreversible,
     katsuragi-durian, bekker, rft), the file of one (ground.toml, as hedgebed calibrate writes it), bed (of grains) or
-    lammps (a bed whose grains are in LAMMPS; the feet move in the plane of x and z). If not given: rft on sand;
-    spring-damper on other surfaces, and with stiffness, damping or scale_with_gravity."""
+    lammps (a bed whose grains are in LAMMPS). If not given: rft on sand; spring-damper on other surfaces, and with
+    stiffness, damping or scale_with_gravity."""
     ground_parameters: Assignments = ()
     """Parameters of a law other than the spring-damper, for one foot, as name=value in SI units (exponent=1.5).
     Defaults are those of a ball tip of 12 mm, scaled to the size of each foot."""

@@ -19,7 +19,7 @@ __all__ = ["check", "resume", "run"]
 def check(settings: SpatialSettings) -> None:
     """Raise ValueError, naming key, value and what is accepted, for what the settings class cannot see."""
     plan = plan_spatial(settings)
-    if settings.ground == "bed":
+    if settings.on_grains:
         SpatialOnBed(settings, plan).check()
     else:
         SpatialFollowed(settings, plan).run_on_law()
@@ -29,7 +29,7 @@ def _carry_out(settings: SpatialSettings, folder: RunFolder, progress: Progress)
     """In `folder`, from its checkpoint where there is one; the result."""
     with folder.lock():
         plan = plan_spatial(settings, platform_file=keep_platform(settings.platform, folder.path, progress.message))
-        if settings.ground == "bed":
+        if settings.on_grains:
             return SpatialOnBed(settings, plan).carry_out(folder, progress)
         on_law = SpatialFollowed(settings, plan)
         on_law.announce(progress)

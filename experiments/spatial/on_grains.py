@@ -17,8 +17,9 @@ from coupling import BedGround, LawGround, SpatialRun, spatial_members
 from coupling.members import Member
 from dem import Bed
 from experiments.grains.following import Followed
-from experiments.grains.on_bed import MARGIN, Forecast, PlatformOnBed
-from experiments.grains.softening import PUSHED
+from experiments.grains.lammps import check_lammps, in_lammps
+from experiments.grains.on_bed import MARGIN, TOUCH, Forecast, PlatformOnBed
+from experiments.grains.softening import PUSHED, run_limit
 from experiments.platform.settled import check_lengths
 from experiments.runs.progress import Progress
 from experiments.runs.result import Result
@@ -66,7 +67,7 @@ class SpatialFollowed(Followed[SpatialRun]):
         lowering = settings.lowering_speed or max(LAW_LOWERING, slow)
         return SpatialRun(
             self.trial, ground, duration=settings.duration, lowering_speed=lowering if settings.placed else None,
-            energy_interval=1e-3, **({} if settings.ground == "bed" else settings.stepping()), **self.start(),
+            energy_interval=1e-3, **({} if settings.on_grains else settings.stepping()), **self.start(),
         )  # fmt: skip
 
     def start(self) -> Mapping[str, Any]:
@@ -83,9 +84,10 @@ class SpatialFollowed(Followed[SpatialRun]):
 
     def announce(self, progress: Progress) -> None:
         """Every default, and the warnings."""
+        self.progress = progress
         for sentence in self.plan.announcement():
             progress.message(sentence)
-        if self.settings.ground != "bed" and (count := 2 * len(uncertain_in(self.plan))):
+        if not self.settings.on_grains and (count := 2 * len(uncertain_in(self.plan))):
             progress.message(say("moved_trials", count=count))
 
     def conclude(self, run: SpatialRun, folder: Path) -> Result:
@@ -136,8 +138,20 @@ class SpatialOnBed(SpatialFollowed, PlatformOnBed[SpatialSettings, SpatialRun, S
             fastest=float(np.linalg.norm(speeds[near], axis=1).max()), rise=float(rows["z"].max() - rows["z"][0]),
         )  # fmt: skip
 
+    def ground(self, bed: Bed) -> BedGround:
+        """The platform on the prepared bed; its grains are in LAMMPS if the settings say so."""
+        s = self.settings
+        if s.ground != "lammps":
+            return super().ground(bed)
+        bed.overlap_limit = run_limit(s.max_overlap)
+        return in_lammps(
+            bed, self.members(), s, self.progress, free=True, touch=TOUCH * self.weight, friction=s.spike_friction,
+            restitution=s.spike_restitution, kept=self.kept, **self.layout(bed),
+        )  # fmt: skip
+
     def check(self) -> None:
         """Raise ValueError, naming key, value and what is accepted, for a bed that does not suit this trial."""
+        check_lammps(self.settings)
         check_lengths(self.settings, self.platform.stance().spike_length)
         try:
             super().check()

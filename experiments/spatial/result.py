@@ -134,14 +134,15 @@ def conclude(
     """
     write_series_of(run, folder)
     numbers, trial, in_rig = quantities_of(run), plan.trial, plan.trial.counterweight > 0
-    where, what = "rig" if in_rig else "free", "bed of " if settings.ground == "bed" else ""
+    where, what = "rig" if in_rig else "free", "bed of " if settings.on_grains else ""
     title = say("title", plan=plan, what=what, where=where, gravity=plan.numbers["gravity_sim"].value)
     warnings = [*plan.warnings, grains.residual_warning(run.energy_residual), grains.unsettled_warning(run.master)]
     result: Json = {
         "title": title, "status": "done",
         "quantities": numbers, "departures": {"sentences": _sentences(run)},
         "trial": plan.trial_table(float(np.linalg.norm(trial.weight))),
-        "surface": plan.surface, "ground": settings.ground, "actuator": settings.actuator,
+        "surface": plan.surface, "ground": "bed" if settings.on_grains else settings.ground,
+        "actuator": settings.actuator,
         "duration": settings.duration, "spike_count": len(trial.platform.tips),
         "transitions": passages(run), "warnings": warnings,
         "macro_step": run.master.macro_step, "steps": run.master.count,

@@ -4,7 +4,8 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from experiments.grains.settings import HIDDEN, GrainsSettings
+from experiments.grains.lammps import ON_GRAINS, RANKS, lammps_fault
+from experiments.grains.settings import GrainsSettings
 from experiments.platform.settings import NotNegative, Positive
 from rigid.checks import nearest
 from vis.page.sentences import Sentences
@@ -16,7 +17,7 @@ say = Sentences(__package__)
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Vector = tuple[Finite, Finite, Finite]
 ZERO = (0.0, 0.0, 0.0)
-GROUNDS = ("spring-damper", "bed")
+GROUNDS = ("spring-damper", *ON_GRAINS)
 ON_ANY_GROUND = (
     "lowering_speed", "substeps", "body_steps", "extrapolation", "iterations", "frame_count", "checkpoint_interval",
 )  # fmt: skip
@@ -30,9 +31,8 @@ class SpatialSettings(GrainsSettings):
     surface: str | None = None
     """Surface: steel, brick, sand, sand-weak, jsc1a or jsc1a-heights; brick if not given."""
     ground: str = "spring-damper"
-    """Law of the force of the ground: spring-damper, or bed (of grains)."""
-    ranks: int | None = Field(None, json_schema_extra=HIDDEN)
-    """Not in space: belongs to ground lammps, whose grains move bodies in a plane only [1]."""
+    """Law of the force of the ground: spring-damper, bed (of grains) or lammps (a bed whose grains are in LAMMPS)."""
+    ranks: int | None = Field(None, ge=1, le=4096, description=RANKS)
     stiffness: Positive | None = None
     """Stiffness K under one spike [N/m]; if not given, half of the surface's, which is for a row of two."""
     damping: NotNegative | None = None
@@ -78,6 +78,11 @@ class SpatialSettings(GrainsSettings):
     duration: Positive = Field(1.0, le=3600, description="Simulated time [s].")
 
     @property
+    def on_grains(self) -> bool:
+        """Whether the ground is made of grains."""
+        return self.ground in ON_GRAINS
+
+    @property
     def placed(self) -> bool:
         """Whether it is set down on the ground before time begins."""
         return self.height is None and not any(self.velocity) and not any(self.angular_velocity)
@@ -97,12 +102,8 @@ class SpatialSettings(GrainsSettings):
         return self
 
     def _known_ground(self) -> str | None:
-        if self.ranks is not None:
-            return say("ranks_in_space", s=self)
         if self.ground in GROUNDS:
-            return None
-        if self.ground == "lammps":
-            return say("in_lammps")
+            return lammps_fault(self)
         return say("no_ground", s=self, known=nearest(self.ground, GROUNDS))
 
     def _friction(self) -> str | None:
@@ -130,7 +131,7 @@ class SpatialSettings(GrainsSettings):
     def _of_a_bed(self) -> str | None:
         if fault := self.stepping_fault():
             return fault
-        if self.ground == "bed":
+        if self.on_grains:
             return self.sleep_fault()
         for name, field in GrainsSettings.model_fields.items():
             if name not in ON_ANY_GROUND and getattr(self, name) != field.default:

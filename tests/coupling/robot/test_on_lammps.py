@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from spatial_runs import EXAMPLES, ball, grain_bed, model_of, moving
 
-from coupling.lammps import LammpsBed, LammpsMissingError, find_lammps
-from coupling.robot import BedFeet, LammpsFeet, LostRobotError, MujocoRobot, RobotRun
+from coupling.lammps import FreeLammpsBed, LammpsBed, LammpsMissingError, find_lammps
+from coupling.robot import BedFeet, LammpsFeet, LostRobotError, MujocoRobot, RobotRun, by_regions
 from dem import SAND, Bed
 
 pytest.importorskip("mujoco", reason="mujoco is not installed: pip install 'hedgebed[mujoco]'")
@@ -38,10 +38,10 @@ def grounds():
     """Makes the feet of a robot on such grains, of this program and in LAMMPS, and ends LAMMPS."""
     made = []
 
-    def make(robot, *, ranks=None, **options):
+    def make(robot, *, ranks=None, free=False, **options):
         bed, kind = unstretched(**options), BedFeet
         if ranks:
-            bed, kind = LammpsBed(bed, ranks=ranks), LammpsFeet
+            bed, kind = (FreeLammpsBed if free else LammpsBed)(bed, ranks=ranks), LammpsFeet
             made.append(bed)
         return kind(bed, robot.feet, origin=(0.5 * bed.size[0], 0.5 * bed.size[1]), **FRICTION)
 
@@ -118,6 +118,25 @@ def test_a_foot_with_the_mesh_of_an_octagonal_plate_lands_askew_as_on_our_bed(gr
     assert theirs.columns["z"] == pytest.approx(ours.columns["z"], abs=moved)
     tilt = [run.joints["qpos"][:, 1] for run in runs]
     assert tilt[1] == pytest.approx(tilt[0], abs=0.02 * np.ptp(tilt[0]))
+
+
+def test_a_foot_with_a_free_root_that_spins_askew_lands_as_on_our_bed(grounds):
+    found = []
+    for options in ({}, {"ranks": 1, "free": True}):
+        model = ball("box", "0.012 0.015 0.01", mass=0.1, height=0.05)
+        robot = moving(MujocoRobot(model, "foot", height=2e-3), 0.1, -0.05, -0.5, 8.0, -5.0, 6.0)
+        assert not by_regions(robot)
+        run = RobotRun(robot, grounds(robot, **options), duration=0.012, substeps=4)
+        run.run()
+        found.append(run)
+    ours, theirs = found
+    forces = [np.column_stack([run.columns[name] for name in ("fx", "fy", "fz")]) for run in found]
+    begin = int(np.argmax(forces[0][:, 2] > 0))
+    first = slice(begin, begin + int(2e-3 / (ours.columns["time"][1] - ours.columns["time"][0])))
+    mean = [force[first].mean(axis=0) for force in forces]
+    assert mean[0][2] > 1.0 and np.linalg.norm(mean[1] - mean[0]) < 0.01 * np.linalg.norm(mean[0])
+    assert theirs.energy_residual < 5e-3 and theirs.columns["fy"].any()
+    assert theirs.columns["z"] == pytest.approx(ours.columns["z"], abs=1e-4)
 
 
 def test_a_stopped_run_goes_on_from_its_state_within_a_percent(grounds):

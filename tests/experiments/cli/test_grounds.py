@@ -57,8 +57,8 @@ def test_the_command_line_says_what_it_left_out(tmp_path, capsys):
     assert "ranks = 2" in told and "left out" in told
 
 
-def test_ranks_in_space_are_refused_with_the_reason():
-    with pytest.raises(ValueError, match="in a plane"):
+def test_ranks_in_space_belong_to_lammps():
+    with pytest.raises(ValueError, match="ground = 'lammps'"):
         SpatialSettings(ranks=2)
 
 

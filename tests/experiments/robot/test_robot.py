@@ -107,21 +107,29 @@ UP = '<joint name="up" type="slide" axis="0 0 1"/>'
 
 
 @pytest.mark.parametrize(
-    ("given", "said"),
+    ("given", "held"),
     [
-        ({"kind": "ellipsoid"}, "'foot' is of the kind ellipsoid, which ground = 'bed' alone .* pieces"),
-        ({"joint": UP + '<joint name="yaw" axis="0 0 1"/>'}, "the joint 'yaw' can turn 'foot' out of the plane"),
-        ({"joint": '<freejoint name="root"/>'}, "the joint 'root' can turn 'foot' out of the plane"),
-        ({"quat": "0.9 0.2 0.1 0"}, "'foot' stands askew"),
+        ({}, True),
+        ({"kind": "ellipsoid"}, False),
+        ({"joint": UP + '<joint name="yaw" axis="0 0 1"/>'}, False),
+        ({"joint": UP + '<joint name="pitch" axis="0 1 0"/>'}, True),
+        ({"joint": '<freejoint name="root"/>'}, False),
+        ({"quat": "0.9 0.2 0.1 0"}, False),
     ],
 )
-def test_feet_that_lammps_cannot_move_are_refused_before_any_work(given, said, tmp_path, monkeypatch):
-    monkeypatch.setattr("experiments.robot.on_grains.check_lammps", lambda *_: None)
+def test_feet_are_regions_of_lammps_where_joints_hold_them_in_the_plane(given, held, tmp_path, monkeypatch):
     file = tmp_path / "rail.xml"
     file.write_text(RAIL.format(**{"kind": "box", "quat": "1 0 0 0", "joint": UP} | given))
-    own = {"model": str(file), "ground": "lammps", "duration": 0.05, "height": None}
-    with pytest.raises(ValueError, match=said):
-        robot.check(RobotSettings(**ON_BED | own))
+    settings = RobotSettings(**ON_BED | {"model": str(file), "ground": "lammps", "duration": 0.05, "height": None})
+    made = {}
+    monkeypatch.setattr(
+        "experiments.robot.on_grains.moved_to_lammps", lambda bed, *_, **given: made.update(given) or bed
+    )
+    monkeypatch.setattr("experiments.robot.on_grains.LammpsFeet", lambda *_, **__: None)
+    run = RobotOnBed(settings, plan_robot(settings))
+    run.progress = None
+    run.ground(grain_bed())
+    assert made == {"free": not held}
 
 
 def test_the_depth_of_a_bed_that_a_refusal_names_is_accepted():

@@ -9,6 +9,7 @@ import pytest
 from spatial_runs import CUBE, small_bed
 from tumble_runs import stop_at
 
+from coupling.lammps import LammpsMissingError, find_lammps
 from experiments.cli.main import main
 from experiments.runs.folder import RunFolder, read_series
 from experiments.spatial import experiment as spatial
@@ -47,7 +48,7 @@ def test_the_cube_that_ships_loads_and_is_what_the_documentation_runs():
         ({"actuator": "brake", "torque": (1.0, 0.0, 0.0)}, "wheel_speed_0 about x = 0 rad/s"),
         ({"actuator": "brake"}, "torque is not given"),
         ({"grain": 0.004}, "grain = 0.004 belongs to ground = 'bed'"),
-        ({"ground": "lammps"}, "'lammps' .* three axes.* 'bed'"),
+        ({"ground": "lammps", "iterations": 3}, "iterations = 3 .* iterations = 1"),
         ({"ground": "beds"}, "'beds'.* 'bed'"),
         ({"ground": "bed", "sleep_pace": 8}, "sleep_pace = 8 needs sleep, which is off"),
         ({"ground": "bed", "sleep_share": 0.4}, "sleep_share = 0.4 belongs to rules of sleep"),
@@ -173,6 +174,32 @@ def test_on_grains_a_stopped_run_goes_on_to_the_same_bits_with_its_books_and_ove
     parts = ("contact_forces", "grains", "hull", "row_forces", "spikes")
     assert frames == [*(f"tumble_{part}_0001.vtu" for part in parts), "tumble_surface_0001.vti"]
     _check_report(tmp_path / "whole")
+
+
+@pytest.mark.long
+def test_on_grains_in_lammps_a_stopped_run_goes_on_to_its_end(tmp_path, monkeypatch, cube):
+    try:
+        find_lammps()
+    except LammpsMissingError as missing:
+        pytest.skip(str(missing))
+    monkeypatch.setattr(SpatialOnBed, "prepare", small_bed)
+    monkeypatch.setattr("experiments.runs.whole_runs.write_report", lambda *_: None)
+    settings = SpatialSettings(
+        surface="sand", ground="lammps", platform=cube, gravity=1.0, turn=(0.3, 0.2, 0.0), velocity=(0.05, 0.02, -0.15),
+        angular_velocity=(0.0, 1.0, 2.0), torque=(0.001, 0.0, 0.0), duration=0.03, bed_size=(0.14, 0.14, 0.05),
+        grain=0.006, young=1e6, max_overlap=0.2, threads=1, frame_count=2, substeps=4,
+    )  # fmt: skip
+    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
+        stop_at(patch, 20)
+        spatial.run(settings, tmp_path)
+    result = spatial.resume(tmp_path)
+    time = read_series(tmp_path / "series" / "motion.csv")["t_s"]
+    assert time[-1] == pytest.approx(0.03, rel=0.01) and (np.diff(time) > 0).all()
+    assert result["ground"] == "bed" and "dissipated_friction" not in result["quantities"]
+    found = {name: quantity["value"] for name, quantity in result["quantities"].items()}
+    assert found["sinkage_largest"] > 1e-3 and found["angular_momentum_residual"] is None
+    # Where it goes on, LAMMPS computes its forces anew, with the velocities of the time of the places.
+    assert found["energy_residual"] < 5e-3 and found["momentum_residual"] < 1e-5 * 0.15 * find_platform(cube).mass
 
 
 def _check_overlaps(result, settings):
