@@ -117,7 +117,13 @@ def push(numbers: NDArray[np.float64], lane_path: NDArray[np.int32], starts: NDA
     out = np.zeros((len(numbers), longest))
     kernel = _kernels(tuple((effect.term, effect.push) for effect in own))[0]
     times = np.zeros(len(depth)) if times is None else times
-    kernel(np.ascontiguousarray(numbers), lane_path.astype(np.int32), starts.astype(np.int32), times, depth, speed, out)
+    followed, first = np.unique(lane_path, return_index=True)
+    like = np.zeros(len(starts) - 1, dtype=np.int32)
+    like[followed] = first
+    scale, shift = (np.repeat(numbers[like, _SLOT[name]], np.diff(starts)) for name in ("speed_scale", "shift_speed"))
+    ways = np.tanh((speed + shift) / scale)
+    lanes = (np.ascontiguousarray(numbers), lane_path.astype(np.int32), starts.astype(np.int32))
+    kernel(*lanes, like, times, depth, speed, ways, out)
     return out
 
 
@@ -237,18 +243,18 @@ def _changes(own: _Own) -> tuple[int, list[Any]]:
             hooks[called] = function
             if hook in _TERM_LINES:
                 where, lines = _TERM_LINES[hook]
-                numbers = "".join(f", n[k, {columns[name]}]" for name in asked[len(FIXED_ARGUMENTS[hook]) :])
+                numbers = "".join(f", n[{columns[name]}]" for name in asked[len(FIXED_ARGUMENTS[hook]) :])
                 calls[where] += [line.format(called, numbers) for line in lines]
             elif hook == "settle":
-                settling.append((called, "".join(f", n[k, {columns[name]}]" for name in asked[len(_VALUES[hook]) :])))
+                settling.append((called, "".join(f", n[{columns[name]}]" for name in asked[len(_VALUES[hook]) :])))
             else:
-                arguments = (name if name in _VALUES[hook] else f"n[k, {columns[name]}]" for name in asked)
+                arguments = (name if name in _VALUES[hook] else f"n[{columns[name]}]" for name in asked)
                 calls[hook].append(f"{called}({', '.join(arguments)})")
     for at, share in _turns(len(settling)):
         called, numbers = settling[at]
         others = f"z - (gone.sum() - gone[{at}])"
         calls["settle"].append(f"gone[{at}] = {called}(gone[{at}], {others}, {share} * span{numbers})")
-    n = "n: ti.template(), k"
+    n = "n: ti.template()"
     return len(settling), _compiled({
         f"loading_changed(before, depth, x, {n})":
             ["grown = before", *(f"grown = {call}" for call in calls["loading"]), "return grown"],
@@ -285,47 +291,47 @@ def _functions(own: _Own) -> tuple[int, Any, Any, Any, Any]:
     REFERENCE, RADIUS_DEPTH, HELD, REACH = (_SLOT[name] for name in ("reference", "radius_depth", _HELD, _REACH))
 
     @ti.func
-    def loading(z: ti.f64, n: ti.template(), k: ti.i32) -> ti.f64:
+    def loading(z: ti.f64, n: ti.template()) -> ti.f64:
         depth = ti.max(z, 0.0)
-        grown = loading_changed(n[k, STIFFNESS] * depth, depth, depth / n[k, REFERENCE], n, k)
+        grown = loading_changed(n[STIFFNESS] * depth, depth, depth / n[REFERENCE], n)
         return grown if depth > 0.0 else 0.0
 
     @ti.func
-    def taken(z: ti.f64, way: ti.f64, turn_z: ti.f64, turn_w: ti.f64, n: ti.template(), k: ti.i32) -> ti.f64:
+    def taken(z: ti.f64, way: ti.f64, turn_z: ti.f64, turn_w: ti.f64, n: ti.template()) -> ti.f64:
         """Share of the friction's bound at z, from `turn_w` at `turn_z` on, where the way last turned."""
-        return way + (turn_w - way) * ti.exp(-ti.abs(z - turn_z) / n[k, REACH])
+        return way + (turn_w - way) * ti.exp(-ti.abs(z - turn_z) / n[REACH])
 
     @ti.func
     def force(
         z: ti.f64, v: ti.f64, way: ti.f64, top: ti.f64, deepest: ti.f64, turn_z: ti.f64, turn_w: ti.f64,
-        gone: ti.f64, n: ti.template(), k: ti.i32,
+        gone: ti.f64, n: ti.template(),
     ) -> ti.f64:  # fmt: skip
         total = 0.0
         if z > 0.0:
             most, ever = ti.max(top, z), ti.max(deepest, z)
             # Where the loading curve is read, what is taken off it, and by how much it bends.
-            at, stiff, bent = unload_changed(z, ever, n[k, STIFFNESS] * (1.0 + n[k, UNLOAD_CHANGE]), n, k)
-            spring = ti.max(loading(at - gone, n, k) * bent - stiff, 0.0)
+            at, stiff, bent = unload_changed(z, ever, n[STIFFNESS] * (1.0 + n[UNLOAD_CHANGE]), n)
+            spring = ti.max(loading(at - gone, n) * bent - stiff, 0.0)
             if ti.static(OWN):
-                s = State(mass=n[k, MASS], gravity=n[k, GRAVITY], weight=n[k, MASS] * n[k, GRAVITY], y=-z, vy=-v)
-                spring = own_spring(s, z, spring, n, k)
+                s = State(mass=n[MASS], gravity=n[GRAVITY], weight=n[MASS] * n[GRAVITY], y=-z, vy=-v)
+                spring = own_spring(s, z, spring, n)
             total = spring
-            total += n[k, DAMPING] * ti.max(v, 0.0) * damper_changed(spring, n, k)
+            total += n[DAMPING] * ti.max(v, 0.0) * damper_changed(spring, n)
             share = 0.0
-            if n[k, HELD] != 0.0:
-                share = taken(z, way, turn_z, turn_w, n, k)
-            reference, radius_depth = n[k, REFERENCE], n[k, RADIUS_DEPTH]
-            total = force_changed(total, z, v, z / reference, way, share, most, ever, reference, radius_depth, n, k)
+            if n[HELD] != 0.0:
+                share = taken(z, way, turn_z, turn_w, n)
+            reference, radius_depth = n[REFERENCE], n[RADIUS_DEPTH]
+            total = force_changed(total, z, v, z / reference, way, share, most, ever, reference, radius_depth, n)
             if ti.static(OWN):
-                s = State(mass=n[k, MASS], gravity=n[k, GRAVITY], weight=n[k, MASS] * n[k, GRAVITY], y=-z, vy=-v)
-                total += own_force(s, z, v, most, n, k)
+                s = State(mass=n[MASS], gravity=n[GRAVITY], weight=n[MASS] * n[GRAVITY], y=-z, vy=-v)
+                total += own_force(s, z, v, most, n)
         return total
 
     @ti.func
-    def carried(z: ti.f64, way: ti.f64, n: ti.template(), k: ti.i32) -> ti.f64:
+    def carried(z: ti.f64, way: ti.f64, n: ti.template()) -> ti.f64:
         more = 0.0
         if way > 0.0:
-            more = mass_changed(z, z / n[k, REFERENCE], n[k, REFERENCE], n, k) / n[k, MASS]
+            more = mass_changed(z, z / n[REFERENCE], n[REFERENCE], n) / n[MASS]
         return more
 
     return settling, force, taken, settled, carried
@@ -336,9 +342,10 @@ def _kernels(own: _Own) -> tuple[Any, Any]:
     from hedgebed_taichi import ti
 
     settling, force, taken, settled, carried = _functions(own)
-    GIVEN_WAY = _SLOT["given_way"]
+    GIVEN_WAY, HELD = _SLOT["given_way"], _SLOT[_HELD]
     MASS, GRAVITY, SPEED_SCALE, SETTLED = _SLOT["mass"], _SLOT["gravity"], _SLOT["speed_scale"], _SETTLED
     SHIFT_DEPTH, SHIFT_ROW, SHIFT_SPEED = (_SLOT[name] for name in ("shift_depth", "shift_row", "shift_speed"))
+    COUNT = len(SLOTS) + sum(len(p.parameters) if q is None else len(_slots_of(q)) for p, q in own)
     Table = ti.types.ndarray(dtype=ti.f64, ndim=2)
     Line = ti.types.ndarray(dtype=ti.f64, ndim=1)
     Whole = ti.types.ndarray(dtype=ti.i32, ndim=1)
@@ -346,35 +353,44 @@ def _kernels(own: _Own) -> tuple[Any, Any]:
 
     @ti.kernel
     def push_all(
-        numbers: Table, lane_path: Whole, starts: Whole, times: Line, depth: Line, speed: Line, out: Table
+        numbers: Table, lane_path: Whole, starts: Whole, like: Whole, times: Line, depth: Line, speed: Line, ways: Line,
+        out: Table,
     ):  # fmt: skip
         for k in range(numbers.shape[0]):  # type: ignore[attr-defined]
             path = lane_path[k]
+            lane = ti.Vector([numbers[k, i] for i in ti.static(range(COUNT))])
+            # `ways` are those of the lane `like[path]`; mostly the path's lanes share them.
+            n = like[path]
+            same = lane[SPEED_SCALE] == numbers[n, SPEED_SCALE] and lane[SHIFT_SPEED] == numbers[n, SHIFT_SPEED]
             top, deepest = 0.0, 0.0
             before, share = 0.0, 0.0
             gone = ti.Vector([0.0 for _ in ti.static(range(settling))])
             for row in range(starts[path], starts[path + 1]):
-                z, v = depth[row] + numbers[k, SHIFT_DEPTH], speed[row] + numbers[k, SHIFT_SPEED]
+                z, v = depth[row] + lane[SHIFT_DEPTH], speed[row] + lane[SHIFT_SPEED]
                 if z <= 0.0:
                     top, before, share = 0.0, 0.0, 0.0
                     gone.fill(0.0)
                 else:
                     if row > starts[path]:
                         half = 0.5 * (times[row] - times[row - 1])
-                        gone = settled(settled(gone, before, half, numbers, k), z, half, numbers, k)
-                    share = taken(z, 1.0 if z > before else -1.0, before, share, numbers, k)
+                        gone = settled(settled(gone, before, half, lane), z, half, lane)
+                    if lane[HELD] != 0.0:
+                        share = taken(z, 1.0 if z > before else -1.0, before, share, lane)
                     before = z
                 top, deepest = ti.max(top, z), ti.max(deepest, z)
-                way = ti.tanh(v / numbers[k, SPEED_SCALE])
-                here = z + numbers[k, SHIFT_ROW]
-                given = gone.sum() + numbers[k, GIVEN_WAY]
-                out[k, row - starts[path]] = force(here, v, way, top, deepest, z, share, given, numbers, k)
+                way = ways[row]
+                if not same:
+                    way = ti.tanh(v / lane[SPEED_SCALE])
+                here = z + lane[SHIFT_ROW]
+                given = gone.sum() + lane[GIVEN_WAY]
+                out[k, row - starts[path]] = force(here, v, way, top, deepest, z, share, given, lane)
 
     @ti.kernel
     def fall_all(numbers: Table, lane_path: Whole, starts: Whole, times: Line, speeds: Line, steps: Line, out: Cube):
         for k in range(numbers.shape[0]):  # type: ignore[attr-defined]
             path = lane_path[k]
-            m, g = numbers[k, MASS], numbers[k, GRAVITY]
+            lane = ti.Vector([numbers[k, i] for i in ti.static(range(COUNT))])
+            m, g = lane[MASS], lane[GRAVITY]
             z, v, t, way = 0.0, speeds[path], 0.0, 1.0
             top, deepest = 0.0, 0.0
             turn_z, turn_w = 0.0, 0.0
@@ -400,13 +416,13 @@ def _kernels(own: _Own) -> tuple[Any, Any]:
                         zs, vs, z1, v1, share = z, v, z, v, 0.0
                         half = gone  # the bed gives way by half before the step and by half after it
                         if inside == 1:
-                            half = settled(gone, z, 0.5 * dt, numbers, k)
+                            half = settled(gone, z, 0.5 * dt, lane)
                         for stage in range(4):
                             a = g
                             if inside == 1:
                                 here = ti.max(zs, 1e-300)
-                                a = g - force(here, vs, way, top, deepest, turn_z, turn_w, half.sum(), numbers, k) / m
-                                a = a / (1.0 + carried(here, way, numbers, k))
+                                a = g - force(here, vs, way, top, deepest, turn_z, turn_w, half.sum(), lane) / m
+                                a = a / (1.0 + carried(here, way, lane))
                             weight = dt / 6.0 if stage == 0 or stage == 3 else dt / 3.0
                             z1 += weight * vs
                             v1 += weight * a
@@ -428,7 +444,7 @@ def _kernels(own: _Own) -> tuple[Any, Any]:
                             t += dt
                             low, high, halvings = 0.0, 0.0, 0
                             if inside == 1:
-                                gone = settled(half, ti.max(z, 1e-300), 0.5 * dt, numbers, k)
+                                gone = settled(half, ti.max(z, 1e-300), 0.5 * dt, lane)
                                 top, deepest = ti.max(top, z), ti.max(deepest, z)
                             if found and crossed:
                                 z = 0.0
@@ -438,18 +454,18 @@ def _kernels(own: _Own) -> tuple[Any, Any]:
                                 else:
                                     inside, way = 1, 1.0
                                     # On what supports it at the surface it would hop for ever, ever less.
-                                    bears = force(1e-300, 0.0, 1.0, 0.0, deepest, 0.0, 0.0, 0.0, numbers, k)
+                                    bears = force(1e-300, 0.0, 1.0, 0.0, deepest, 0.0, 0.0, 0.0, lane)
                                     if v < SETTLED and bears > m * g:
                                         v, resting = 0.0, 1
                                 turn_z, turn_w = 0.0, 0.0
                             elif found and turned:
                                 v = 0.0
-                                turn_z, turn_w = z, taken(z, way, turn_z, turn_w, numbers, k)
+                                turn_z, turn_w = z, taken(z, way, turn_z, turn_w, lane)
                                 down, up = 0.0, 0.0
                                 given = gone.sum()
                                 for side in range(2):
                                     tried = 1.0 - 2.0 * side
-                                    a = g - force(z, 0.0, tried, top, deepest, turn_z, turn_w, given, numbers, k) / m
+                                    a = g - force(z, 0.0, tried, top, deepest, turn_z, turn_w, given, lane) / m
                                     if side == 0:
                                         down = a
                                     else:
@@ -465,8 +481,8 @@ def _kernels(own: _Own) -> tuple[Any, Any]:
                     else:
                         pushed, more = 0.0, 0.0
                         if inside == 1 and resting == 0:
-                            pushed = force(z, v, way, top, deepest, turn_z, turn_w, gone.sum(), numbers, k)
-                            more = carried(z, way, numbers, k)
+                            pushed = force(z, v, way, top, deepest, turn_z, turn_w, gone.sum(), lane)
+                            more = carried(z, way, lane)
                         out[k, at, 0] = z
                         out[k, at, 1] = v
                         out[k, at, 2] = 0.0 if resting == 1 else (g - pushed / m) / (1.0 + more)
