@@ -1,7 +1,5 @@
 """What the error of a smoothed depth leaves in doubt of a driven trial's force: at the surface, and where it turns."""
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -22,8 +20,9 @@ _FAILED = 1e3  # residual over the noise where a model is no number
 
 def bounded(rest: Array) -> Array:
     """Residuals over the noise that a sum of squares can hold."""
-    near = np.clip(rest, -1e5, 1e5)
-    return near if math.isfinite(float(rest.sum())) else np.where(np.isfinite(rest), near, _FAILED)
+    if np.abs(rest).max(initial=0.0) <= 1e5:  # false of what is no number
+        return rest
+    return np.where(np.isfinite(rest), np.clip(rest, -1e5, 1e5), _FAILED)
 
 
 def path_error(smooth: SmoothDepth, by_depth: Array, by_row: Array) -> Array:
