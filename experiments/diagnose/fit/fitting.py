@@ -217,6 +217,7 @@ def _descent(model: Model, start: Values, rule: Rule) -> _Walk[Fit]:
     precision = np.array([p.std**-2 for p in parameters])
     x = np.clip(_numbers(parameters, start), low, high)
     names = [p.name for p in parameters]
+    unturned = model.unturned  # modes are needed at the end only: steps follow from their products
 
     def named(values: Array) -> dict[str, float]:
         return dict(zip(names, values.tolist(), strict=True))
@@ -228,7 +229,7 @@ def _descent(model: Model, start: Values, rule: Rule) -> _Walk[Fit]:
     jacobian = np.zeros((0, len(x)))
     free = np.ones(len(x), dtype=bool)
     for number, share in enumerate(rule.shares):
-        part, whole, best = replace(model, share=share) if share < 1 else model, share >= 1, None
+        part, whole, best = replace(unturned, share=share) if share < 1 else unturned, share >= 1, None
         if number or rule.scan:
             x = _numbers(parameters, (yield from _scan(part, named(x)))[0])
         damping, scannable = rule.damping, True
@@ -252,7 +253,7 @@ def _descent(model: Model, start: Values, rule: Rule) -> _Walk[Fit]:
             place = int(np.argmin(objectives))
             gain = objective - objectives[place]
             if gain > 0:
-                x, best = trials[place], modes[place]
+                x, best = trials[place], modes[place].copy()  # the others of the batch are not kept
                 damping = max(damping * rule.tries[place].keep + rule.tries[place].then, rule.least)
             if gain >= (rule.enough + rule.relative * objective if whole else rule.early * objective):
                 continue
@@ -266,8 +267,12 @@ def _descent(model: Model, start: Values, rule: Rule) -> _Walk[Fit]:
                     continue
             break
     if best is None:
-        (best,) = yield model, [named(x)]
-    return Fit(model, named(x), best, jacobian, float(best @ best), penalty(x), free)
+        (best,) = yield unturned, [named(x)]
+    chi_square = float(best @ best)
+    if unturned is not model:
+        best = model.turned(best)
+        jacobian = model.turned(jacobian.T).T if len(jacobian) else jacobian
+    return Fit(model, named(x), best, jacobian, chi_square, penalty(x), free)
 
 
 def _step(
@@ -480,7 +485,7 @@ def _slopes(model: Model, x: Array, known: Array | None = None) -> _Walk[tuple[A
             point[p.name] = x[k] + steps[k]
         points.append(point)
     modes = yield model, points
-    modes = modes if known is None else [known, *modes]
+    modes = [modes[0].copy(), *modes[1:]] if known is None else [known, *modes]
     jacobian = np.zeros((len(modes[0]), len(parameters)))
     rows = model.rows()
     for place, members in enumerate(groups, 1):

@@ -377,10 +377,30 @@ class Whitener:
         """Modes of the residuals of a trial, shape [sample_count], or [point_count, sample_count]."""
         if trial in self.kept:
             residuals = residuals * self.kept[trial]
+        return self.turned(trial, residuals) * self.weights[trial]
+
+    def turned(self, trial: str, residuals: Array) -> Array:
+        """Residuals of a trial by mode, not weighed; shapes as of `modes`."""
         if not self.blocks:
             return residuals
+        if len(self.blocks[trial]) == 1:  # whose rows are those of the trial, in their order
+            return dct(residuals, norm="ortho", axis=-1)
         parts = [dct(np.take(residuals, rows, axis=-1), norm="ortho", axis=-1) for rows in self.blocks[trial]]
-        return np.concatenate(parts, axis=-1) * self.weights[trial]
+        return np.concatenate(parts, axis=-1)
+
+    @cached_property
+    def unturned(self) -> Whitener:
+        """One that turns nothing, where each channel of a trial is weighed by one number: products of modes over a
+        trial are then those of residuals so weighed. Else this one."""
+        weights = {}
+        for trial, blocks in self.blocks.items():
+            weights[trial], start = np.ones(len(self.weights[trial])), 0
+            for rows in blocks:
+                own = self.weights[trial][start : (start := start + len(rows))]
+                if np.ptp(own) > 0:
+                    return self
+                weights[trial][rows] = own
+        return replace(self, blocks={}, weights=weights) if weights else self
 
     def channel_blocks(self, problem: Problem, trial: str) -> list[tuple[str, slice]]:
         """Each channel of a trial, and where its modes stand."""
@@ -456,7 +476,20 @@ class Model:
 
         many = len(residuals) * sum(len(self.whitener.weights[id]) for id in self.trials) >= _MANY
         parts = each(modes, self.trials, threads=None if many else 1)
-        return [np.concatenate([part[k] for part in parts]) for k in range(len(residuals))]
+        return list(np.concatenate(parts, axis=1))
+
+    @property
+    def unturned(self) -> Model:
+        """The same with residuals for modes, where products of them are the same (`Whitener.unturned`); else this one.
+        A search of contacts counts modes: it needs them."""
+        if self.problem.contacts is not None or self.whitener.unturned is self.whitener:
+            return self
+        return replace(self, whitener=self.whitener.unturned)
+
+    def turned(self, unturned: Array) -> Array:
+        """Modes, from what `unturned` has for them; shape [n] or [count, n]."""
+        parts = [self.whitener.turned(trial, unturned[..., rows]) for trial, rows in self.rows().items()]
+        return np.concatenate(parts, axis=-1)
 
     def rows(self) -> dict[str, slice]:
         """Where each trial's modes stand."""
@@ -483,5 +516,15 @@ def evaluate_all(asked: Sequence[tuple[Model, Sequence[Values]]]) -> list[list[A
             for one, own in zip(models, points, strict=True)
         ]
         residuals = models[0].problem.evaluate_together(whole, trials, share)
-        found |= {k: model.modes(own) for k, model, own in zip(mine, models, residuals, strict=True)}
+        for like in _turned_alike(models):
+            modes = iter(models[like[0]].modes([one for k in like for one in residuals[k]]))
+            found |= {mine[k]: [next(modes) for _ in residuals[k]] for k in like}
     return [found[k] for k in range(len(asked))]
+
+
+def _turned_alike(models: Sequence[Model]) -> list[list[int]]:
+    """The places of models whose modes are the same ones of a residual; alone where a model has modes of its own."""
+    alike: dict[tuple[int, int], list[int]] = {}
+    for k, model in enumerate(models):
+        alike.setdefault((id(model.whitener), -1 if type(model) is Model else k), []).append(k)
+    return list(alike.values())
