@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -83,11 +84,21 @@ class Fit:
 
     model: Model
     values: dict[str, float]
-    modes: Array  # residual modes, shape [n]
-    jacobian: Array  # d modes / d parameter / scale, shape [n, p]
+    rest: Array  # residual modes, shape [n], as `model.unturned` has them
+    slopes: Array  # d rest / d parameter / scale, shape [n, p]
     chi_square: float  # of the data alone
     penalty: float  # of the priors
     free: NDArray[np.bool_] = field(repr=False)  # parameters not held by a bound, shape [p]
+
+    @cached_property
+    def modes(self) -> Array:
+        """Residual modes, shape [n]."""
+        return self.rest if self.model.unturned is self.model else self.model.turned(self.rest)
+
+    @cached_property
+    def jacobian(self) -> Array:
+        """d modes / d parameter / scale, shape [n, p]."""
+        return self.slopes if self.model.unturned is self.model else self.model.turned(self.slopes.T).T
 
     @property
     def objective(self) -> float:
@@ -97,7 +108,7 @@ class Fit:
     @property
     def count(self) -> int:
         """Samples."""
-        return len(self.modes)
+        return len(self.rest)
 
     def prior_precision(self) -> Array:
         """(scale / std)^2 of each parameter, 0 where it is free, shape [p]."""
@@ -105,7 +116,7 @@ class Fit:
 
     def hessian(self) -> Array:
         """Of half the objective, in units of the parameters' scales, shape [p, p]."""
-        return self.jacobian.T @ self.jacobian + np.diag(self.prior_precision())
+        return self.slopes.T @ self.slopes + np.diag(self.prior_precision())
 
     def covariance(self, *, inflation: float = 1.0) -> Array:
         """Of the values, in their units, shape [p, p]; bounds are not seen, singular directions get wide.
@@ -113,7 +124,7 @@ class Fit:
         `inflation`: by how much the data are noisier than stated; the priors are not.
         """
         scales = np.array([p.scale for p in self.model.parameters])
-        hessian = self.jacobian.T @ self.jacobian / inflation**2 + np.diag(self.prior_precision())
+        hessian = self.slopes.T @ self.slopes / inflation**2 + np.diag(self.prior_precision())
         size = np.sqrt(np.maximum(np.diag(hessian), 1e-300))
         inverse = np.linalg.pinv(hessian / np.outer(size, size), rcond=1e-12, hermitian=True)
         return inverse / np.outer(size, size) * np.outer(scales, scales)
@@ -129,7 +140,7 @@ class Fit:
         scales = np.array([p.scale for p in parameters])
         pull = self.prior_precision() * np.array([self.values[p.name] - p.value for p in parameters]) / scales
         gradients = np.array([
-            self.jacobian[rows].T @ self.modes[rows] + pull * [p.trial == trial for p in parameters]
+            self.slopes[rows].T @ self.rest[rows] + pull * [p.trial == trial for p in parameters]
             for trial, rows in self.model.rows().items()
         ])  # fmt: skip
         bread = self.covariance() / scales
@@ -268,11 +279,7 @@ def _descent(model: Model, start: Values, rule: Rule) -> _Walk[Fit]:
             break
     if best is None:
         (best,) = yield unturned, [named(x)]
-    chi_square = float(best @ best)
-    if unturned is not model:
-        best = model.turned(best)
-        jacobian = model.turned(jacobian.T).T if len(jacobian) else jacobian
-    return Fit(model, named(x), best, jacobian, chi_square, penalty(x), free)
+    return Fit(model, named(x), best, jacobian, float(best @ best), penalty(x), free)
 
 
 def _step(
@@ -396,8 +403,8 @@ class Linear:
 
 
 def settled(found: Fit) -> Fit:
-    """The same with its Jacobian taken over steps worth a standard deviation of the data (`settled_slopes`)."""
-    return replace(found, jacobian=settled_slopes(found.model, found.values)[1])
+    """The same with its slopes taken over steps worth a standard deviation of the data (`settled_slopes`)."""
+    return replace(found, slopes=settled_slopes(found.model.unturned, found.values)[1])
 
 
 def settled_slopes(model: Model, values: Values) -> tuple[Array, Array]:
@@ -486,7 +493,7 @@ def _slopes(model: Model, x: Array, known: Array | None = None) -> _Walk[tuple[A
         points.append(point)
     modes = yield model, points
     modes = [modes[0].copy(), *modes[1:]] if known is None else [known, *modes]
-    jacobian = np.zeros((len(modes[0]), len(parameters)))
+    jacobian = np.zeros((len(parameters), len(modes[0]))).T  # whose columns are filled one by one
     rows = model.rows()
     for place, members in enumerate(groups, 1):
         change = modes[place] - modes[0]

@@ -471,6 +471,12 @@ class Model:
     def modes(self, residuals: Sequence[Mapping[str, Array]]) -> list[Array]:
         """The same of residuals by trial, as the problem has them at each point."""
 
+        if not self.whitener.blocks:
+            found = np.empty((len(residuals), sum(len(self.whitener.weights[id]) for id in self.trials)))
+            for trial, rows in self.rows().items():
+                found[:, rows] = self.whitener.modes(trial, np.stack([one[trial] for one in residuals]))
+            return list(found)
+
         def modes(trial: str) -> Array:
             return self.whitener.modes(trial, np.stack([one[trial] for one in residuals]))
 

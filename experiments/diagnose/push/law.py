@@ -32,7 +32,7 @@ from rigid.model.model import for_taichi
 from rigid.terms import CANDIDATES, FIXED_ARGUMENTS, STATE_FIELDS, Term
 from rigid.terms.candidate import Push
 
-__all__ = ["PHASES", "SLOTS", "fall", "given_way", "push", "slot_places", "slot_table"]
+__all__ = ["PHASES", "SLOTS", "fall", "given_way", "push", "push_each", "slot_places", "slot_table"]
 
 _HERE = ("z", "v", "x", "way", "share", "most", "ever", "reference", "radius_depth")
 _VALUES: Mapping[str, tuple[str, ...]] = {
@@ -112,9 +112,38 @@ def push(numbers: NDArray[np.float64], lane_path: NDArray[np.int32], starts: NDA
     after another. `own`: effects from files, whose parameters `numbers` holds. `times`: of the paths [s]; without
     them no time passes, so that nothing gives way.
     """
-    ensure()
     longest = int(np.diff(starts).max())
     out = np.zeros((len(numbers), longest))
+    begins = longest * np.arange(len(numbers))
+    _push(numbers, lane_path, starts, depth, speed, own, times, begins, out.reshape(-1))
+    return out
+
+
+def push_each(
+    numbers: NDArray[np.float64], starts: NDArray[np.int32], depth: NDArray[np.float64], speed: NDArray[np.float64],
+    own: tuple[OwnEffect, ...], times: NDArray[np.float64],
+) -> list[NDArray[np.float64]]:  # fmt: skip
+    """The same of as many lanes on each path, those of the first path first: of each path forces [N], shape [lane_count
+    of the path, its rows]."""
+    paths = len(starts) - 1
+    count, lengths = len(numbers) // paths, np.diff(starts)
+    out = np.empty(count * int(starts[-1]))
+    begins = np.repeat(count * starts[:-1].astype(np.int64), count) + np.tile(np.arange(count), paths) * np.repeat(
+        lengths, count
+    )
+    lane_path = np.repeat(np.arange(paths, dtype=np.int32), count)
+    _push(numbers, lane_path, starts, depth, speed, own, times, begins, out)
+    edges = count * starts.astype(np.int64)
+    return [out[edges[p] : edges[p + 1]].reshape(count, -1) for p in range(paths)]
+
+
+def _push(
+    numbers: NDArray[np.float64], lane_path: NDArray[np.int32], starts: NDArray[np.int32], depth: NDArray[np.float64],
+    speed: NDArray[np.float64], own: tuple[OwnEffect, ...], times: NDArray[np.float64] | None,
+    begins: NDArray[np.int64], out: NDArray[np.float64],
+) -> None:  # fmt: skip
+    """Put the forces of a lane into `out` from its place in `begins` on."""
+    ensure()
     kernel = _kernels(tuple((effect.term, effect.push) for effect in own))[0]
     times = np.zeros(len(depth)) if times is None else times
     followed, first = np.unique(lane_path, return_index=True)
@@ -122,9 +151,8 @@ def push(numbers: NDArray[np.float64], lane_path: NDArray[np.int32], starts: NDA
     like[followed] = first
     scale, shift = (np.repeat(numbers[like, _SLOT[name]], np.diff(starts)) for name in ("speed_scale", "shift_speed"))
     ways = np.tanh((speed + shift) / scale)
-    lanes = (np.ascontiguousarray(numbers), lane_path.astype(np.int32), starts.astype(np.int32))
-    kernel(*lanes, like, times, depth, speed, ways, out)
-    return out
+    lanes = (np.ascontiguousarray(numbers), lane_path.astype(np.int32), starts.astype(np.int32), like, begins)
+    kernel(*lanes, times, depth, speed, ways, out)
 
 
 def fall(numbers: NDArray[np.float64], lane_path: NDArray[np.int32], starts: NDArray[np.int32],
@@ -348,13 +376,13 @@ def _kernels(own: _Own) -> tuple[Any, Any]:
     COUNT = len(SLOTS) + sum(len(p.parameters) if q is None else len(_slots_of(q)) for p, q in own)
     Table = ti.types.ndarray(dtype=ti.f64, ndim=2)
     Line = ti.types.ndarray(dtype=ti.f64, ndim=1)
-    Whole = ti.types.ndarray(dtype=ti.i32, ndim=1)
+    Whole, Long = (ti.types.ndarray(dtype=dtype, ndim=1) for dtype in (ti.i32, ti.i64))
     Cube = ti.types.ndarray(dtype=ti.f64, ndim=3)
 
     @ti.kernel
     def push_all(
-        numbers: Table, lane_path: Whole, starts: Whole, like: Whole, times: Line, depth: Line, speed: Line, ways: Line,
-        out: Table,
+        numbers: Table, lane_path: Whole, starts: Whole, like: Whole, begins: Long, times: Line, depth: Line,
+        speed: Line, ways: Line, out: Line,
     ):  # fmt: skip
         for k in range(numbers.shape[0]):  # type: ignore[attr-defined]
             path = lane_path[k]
@@ -383,7 +411,7 @@ def _kernels(own: _Own) -> tuple[Any, Any]:
                     way = ti.tanh(v / lane[SPEED_SCALE])
                 here = z + lane[SHIFT_ROW]
                 given = gone.sum() + lane[GIVEN_WAY]
-                out[k, row - starts[path]] = force(here, v, way, top, deepest, z, share, given, lane)
+                out[begins[k] + row - starts[path]] = force(here, v, way, top, deepest, z, share, given, lane)
 
     @ti.kernel
     def fall_all(numbers: Table, lane_path: Whole, starts: Whole, times: Line, speeds: Line, steps: Line, out: Cube):

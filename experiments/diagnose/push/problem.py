@@ -9,7 +9,7 @@ start and scored on depth and acceleration.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -39,7 +39,7 @@ from .depth import SmoothDepth
 from .design import best_push
 from .doubt import bounded, off_rest, off_surface, path_error, reversing, touching, turning
 from .forms import physical, push_forms, unit_of
-from .law import PHASES, SLOTS, fall, push, slot_places, slot_table
+from .law import PHASES, SLOTS, fall, push_each, slot_places, slot_table
 from .model_file import Pairs, model_of, range_of
 from .parameters import base_parameters, comes_back, diameters_of, find_scales, named, speeds_of
 from .remarks import SURE, Push, at_one_speed, contradict, facts, highest_dampings, how_to_determine
@@ -138,7 +138,8 @@ class PenetrationProblem(Problem):
                 lanes[:, _SLOT["speed_scale"]] = trial.smooth.slow
         into[..., _SLOT["reference"]] = self._scales.depth
         every = [values for points, _ in asked for values in points]
-        bed, damper, unloading, zero = (_own(every, kind, trials) for kind in _OWN)
+        given = set[str]().union(*every)
+        bed, damper, unloading, zero = (_own(every, kind, trials, given) for kind in _OWN)
         k, c = (self._of_each(every, which, trials) for which in ("stiffness", "damping"))
         into[..., _SLOT["stiffness"]] = stiffness = k * (1.0 + bed)
         into[..., _SLOT["damping"]] = c * (1.0 + bed) * (1.0 + damper)
@@ -192,20 +193,19 @@ class PenetrationProblem(Problem):
         # Effects from files are compiled in where one of them is on: another kernel.
         own = self.own if self._has_own(asked[0][1]) else ()
         numbers = slot_table(count * len(trials), own)
-        lanes = np.repeat(np.arange(len(trials), dtype=np.int32), count)
         self._fill(trials, asked, numbers.reshape(len(trials), count, -1))
         numbers[:, _SLOT["shift_depth"]] += shifts[0]
         numbers[:, _SLOT["shift_speed"]], numbers[:, _SLOT["shift_row"]] = shifts[1:]
         starts = np.cumsum([0, *(len(trial.time) for trial in trials)]).astype(np.int32)
         if trials[0].driven:
             depth, speed = (np.concatenate([getattr(t.path, name) for t in trials]) for name in ("depth", "speed"))
-            out = push(numbers, lanes, starts, depth, speed, own, np.concatenate([trial.time for trial in trials]))
-            zeros = _own([values for points, _ in asked for values in points], "force zero", trials)
-            if zeros.any():
-                out += zeros.reshape(-1, 1)
-        else:
-            speeds = np.array([trial.table.speed or 0.0 for trial in trials])
-            out = fall(numbers, lanes, starts, np.concatenate([trial.time for trial in trials]), speeds, own)
+            out = push_each(numbers, starts, depth, speed, own, np.concatenate([trial.time for trial in trials]))
+            every = [values for points, _ in asked for values in points]
+            zeros = _own(every, "force zero", trials, set[str]().union(*every))
+            return [one + zero[:, None] if zero.any() else one for one, zero in zip(out, zeros, strict=True)]
+        lanes = np.repeat(np.arange(len(trials), dtype=np.int32), count)
+        speeds = np.array([trial.table.speed or 0.0 for trial in trials])
+        out = fall(numbers, lanes, starts, np.concatenate([trial.time for trial in trials]), speeds, own)
         return [out[p * count : (p + 1) * count, : len(trial.time)] for p, trial in enumerate(trials)]
 
     def evaluate_together(
@@ -509,7 +509,11 @@ class PenetrationProblem(Problem):
         )  # fmt: skip
 
 
-def _own(points: Sequence[Values], kind: str, trials: Sequence[Prepared]) -> Array:
-    """A number of each trial's own at each point, 0 where there is none, shape [trials, points]."""
-    return np.array([[values.get(name, 0.0) for values in points]
-                     for name in (f"{kind}[{trial.info.id}]" for trial in trials)])  # fmt: skip
+def _own(points: Sequence[Values], kind: str, trials: Sequence[Prepared], given: Container[str]) -> Array:
+    """A number of each trial's own at each point, 0 where there is none, shape [trials, points]. `given`: the names
+    that some point has."""
+    found = np.zeros((len(trials), len(points)))
+    for own, name in zip(found, (f"{kind}[{trial.info.id}]" for trial in trials), strict=True):
+        if name in given:
+            own[:] = [values.get(name, 0.0) for values in points]
+    return found
