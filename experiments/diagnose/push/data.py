@@ -1,9 +1,11 @@
 """Trials of penetration made ready for fits: gaps left out, faults found and set aside, depth smoothed."""
 
+import hashlib
 import math
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,10 +69,26 @@ class Prepared:
 
 
 def prepare(campaign: Campaign) -> tuple[list[Prepared], list[Finding]]:
-    """The trials that can be used, and what was wrong with the data.
+    """The trials that can be used, and what was wrong with the data. The last campaign's are kept: a command checks a
+    campaign before it diagnoses it, and smoothing takes long.
 
     Raises ValueError where no trial is left, or a sensor that is scored has no noise.
     """
+    digest = hashlib.sha256(repr(campaign.tables).encode())
+    for key, recording in campaign.recordings.items():
+        for name, column in recording.columns.items():
+            digest.update(repr((key, name)).encode() + column.tobytes())
+    if _KEPT.get("of") != digest.digest():
+        _KEPT.update(of=digest.digest(), found=_prepared(campaign))
+    trials, findings = _KEPT["found"]
+    return list(trials), list(findings)
+
+
+_KEPT: dict[str, Any] = {}  # digest of a campaign, and its trials and findings as they were prepared
+
+
+def _prepared(campaign: Campaign) -> tuple[list[Prepared], list[Finding]]:
+    """The same, made anew."""
     tables = campaign.tables
     assert isinstance(tables, PenetrationCampaign)
     recordings = {table.id: campaign.recordings[table.id, "data"] for table in tables.trial}

@@ -10,6 +10,7 @@ series/<trial>.<channel>.csv    t_s,measured,before,after,std,std_after,phase (a
 """
 
 import math
+import re
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
@@ -321,13 +322,22 @@ def _write_model(path: Path, found: Diagnosis, notes: Mapping[str, Json] | None 
 
 
 def _write_near_models(folder: Path, found: Diagnosis, near: Sequence[Near]) -> list[Json]:
-    """Write the models of other answers within the margin, and return their effects and files."""
+    """Write the models of other answers within the margin, and return their effects, forms and files. A model of the
+    same effects has its forms in the name of its file."""
     listed = []
-    for effects, other in near_models(found, near).items():
-        file = f"model-{'-and-'.join(effects)}.toml"
+    for other in near_models(found, near):
+        effects = other.effects
+        forms = sorted((form.id for form in other.forms), key=lambda id: effects.index(id.partition(":")[0]))
+        same = set(effects) == set(found.effects)
+        file = f"model-{'-and-'.join(map(_as_file, forms) if same else effects)}.toml"
         _write_model(folder / file, other)
-        listed.append({"effects": list(effects), "file": file})
+        listed.append({"effects": list(effects), "forms": forms, "file": file})
     return listed
+
+
+def _as_file(form: str) -> str:
+    """A form's id as part of a file's name."""
+    return re.sub("[^a-z0-9]+", "-", form.lower()).strip("-")
 
 
 def _equations(found: Diagnosis) -> list[Json]:
