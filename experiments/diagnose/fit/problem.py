@@ -33,8 +33,9 @@ from experiments.check.words import Finding
 from rigid.terms.candidate import Bend, Number
 
 from .together import each
+from .trials import Planned, Samples, TrialInfo
 
-__all__ = ["Array", "Contacts", "Finding", "Form", "Model", "Parameter", "Problem", "Samples", "TrialInfo", "Values",
+__all__ = ["Array", "Contacts", "Finding", "Form", "Model", "Parameter", "Problem", "Values",
            "Whitener", "evaluate_all"]  # fmt: skip
 
 _MANY = 2**15  # residuals from which threads are worth their while
@@ -105,31 +106,6 @@ class Form:
         return {f"{self.effect}.{number.fitted}": number for number in self.numbers}
 
 
-@dataclass(frozen=True, kw_only=True)
-class TrialInfo:
-    """What the core must know of a trial."""
-
-    id: str
-    condition: tuple[object, ...]
-    """Trials of one condition are replicates. What is sorted next to one another is alike."""
-    settings: Mapping[str, float] = field(default_factory=dict)
-    """Numbers by which a person localises: ``torque_N_m``, ``gravity_m_s2``, ``speed_m_s``, ``diameter_m``."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Samples:
-    """The valid samples of a trial, in the order of its residuals; shapes [sample_count].
-
-    A channel's samples lie together and in the order of their times.
-    """
-
-    time: Array  # on the trial's clock [s]
-    channel: NDArray[np.str_]  # ``x y theta gyro ax ay wheel depth force accel``
-    std: Array
-    """Of the sensor as campaign.toml states it, in the channel's unit (of a driven force at the base model's fit,
-    the smoothed depth's error included)."""
-
-
 class Contacts(Protocol):
     """A search of its own for where fits begin: of trials that touch, slip and fall, whose likelihood jumps."""
 
@@ -162,19 +138,6 @@ class Estimate(Protocol):
 
     def covariance(self, *, inflation: float = 1.0) -> Array:
         """Of the numbers, in their units, shape [p, p]; `inflation`: by how much the data are noisier than stated."""
-
-
-@dataclass(frozen=True)
-class Planned:
-    """A trial that was not made, and how well it would separate two models."""
-
-    settings: Mapping[str, float]  # name with its unit -> value
-    what: str  # the trial in words
-    nats: float  # evidence to be expected
-    tried: int  # trials of the search
-    apart: Mapping[str, float] | None = None
-    """Where the two predictions differ most over their errors: ``depth_m``, ``speed_m_s`` (negative on the way back),
-    ``one_N`` and ``other_N`` with ``one_std_N`` and ``other_std_N``."""
 
 
 class Problem(Protocol):

@@ -15,7 +15,8 @@ from scipy.stats import norm
 from experiments.campaign import Campaign, PenetrationCampaign, Recording
 from experiments.campaign.tables import PenetrationTrial, SpikeTable
 from experiments.check.replicas import pace_of
-from experiments.diagnose.fit.problem import Array, Finding, TrialInfo
+from experiments.diagnose.fit.problem import Array, Finding
+from experiments.diagnose.fit.trials import TrialInfo
 from experiments.diagnose.noise.colour import Colour, colour_of, together
 from experiments.diagnose.noise.replicates import parted
 from experiments.diagnose.noise.stuck import clipped, cut_rows, stuck_rows

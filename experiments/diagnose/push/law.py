@@ -29,77 +29,25 @@ from numpy.typing import NDArray
 from experiments.diagnose.fit.forms import OwnEffect
 from rigid.batch.runtime import ensure
 from rigid.model.model import for_taichi
-from rigid.terms import CANDIDATES, FIXED_ARGUMENTS, STATE_FIELDS, Term
+from rigid.terms import FIXED_ARGUMENTS, STATE_FIELDS, Term
 from rigid.terms.candidate import Push
 
-__all__ = ["PHASES", "SLOTS", "fall", "given_way", "push", "push_each", "slot_places", "slot_table"]
+from .slots import HERE, LIBRARY, PLACES, SLOTS, VALUES, slots_of
 
-_HERE = ("z", "v", "x", "way", "share", "most", "ever", "reference", "radius_depth")
-_VALUES: Mapping[str, tuple[str, ...]] = {
-    "loading": ("grown", "depth", "x"), "unload": ("at", "stiff", "bent", "z", "ever", "stiffness"),
-    "damper": ("factor", "spring"), "settle": ("gone", "z", "span"), "mass": ("z", "x", "reference"),
-    "force": ("total", *_HERE), "pull": ("total", *_HERE),
-}  # fmt: skip
-"""What each hook of `Push.law` may ask for beside its effect's slots."""
+__all__ = ["PHASES", "fall", "given_way", "push", "push_each"]
 
-
-def _slots_of(law: Push) -> tuple[str, ...]:
-    """Numbers of one trial that an effect's hooks ask for, in their order."""
-    asked = [name for hook, function in law.law.items() for name in inspect.signature(function).parameters
-             if name not in _VALUES[hook]]  # fmt: skip
-    return tuple(dict.fromkeys((*asked, *(law.turning or ()))))
-
-
-_LIBRARY = tuple(
-    push for _, _, push in sorted((c.push.rank, id, c.push) for id, c in CANDIDATES.items() if c.push is not None)
-)
-SLOTS = (
-    "mass", "gravity", "stiffness", "damping", "reference", "speed_scale", "radius_depth",
-    *(slot for effect in _LIBRARY for slot in _slots_of(effect)), "shift_depth", "shift_row", "shift_speed",
-    "given_way", "unload_change",
-)  # fmt: skip
-"""Numbers of a lane, in order. `radius_depth`: depth at which the tip is wholly in; `speed_scale`: below it the
-direction of a driven spike is not certain; shifts: added to a driven spike's path, for derivatives (`shift_row`: to the
-depth of each row alone, with its history unchanged); `given_way`: permanent sinkage of the bed before the push [m];
-`unload_change`: of K where the way back has a stiffness of its own, relative."""
 PHASES = ("free", "in", "rest", "out")
 
-_SLOT = {name: place for place, name in enumerate(SLOTS)}
-_NEVER_ZERO = {"reference": 0.01, "speed_scale": 1e-4, "radius_depth": 1e-4}
-_HELD, _REACH = next(effect.turning for effect in _LIBRARY if effect.turning is not None)
+_HELD, _REACH = next(effect.turning for effect in LIBRARY if effect.turning is not None)
 _STEP, _TURN = 1.25e-3, 0.1
 """Longest step of a drop [s], and over sqrt(m / K), which is tens of ms for a spike on sand. With these what is off
 stays below 0.004 of the sensors' noise for every form of the library."""
-_STEEP, _RISE = next(effect.steep for effect in _LIBRARY if effect.steep is not None)
+_STEEP, _RISE = next(effect.steep for effect in LIBRARY if effect.steep is not None)
 _SHORTEST = 2e-6
 """Shortest step of a drop for a friction that rises with speed [s]."""
 
 _SETTLED = 1e-3
 """Speed [m/s] at which a spike that comes back to a surface that supports it stays there: it would hop by 5e-8 m."""
-
-
-def slot_places(own: Sequence[OwnEffect] = ()) -> dict[str, int]:
-    """Slot -> its place in a lane; those of effects from files stand behind `SLOTS`, in order."""
-    names = [name for effect in own for name, _ in _own_slots(effect)]
-    return _SLOT | {name: len(SLOTS) + place for place, name in enumerate(names)}
-
-
-def _own_slots(effect: OwnEffect) -> list[tuple[str, float]]:
-    """Numbers of an effect from a file: slot, and its value where the effect is off."""
-    if effect.push is not None:
-        return [(slot, effect.push.lengths.get(slot, 0.0)) for slot in _slots_of(effect.push)]
-    return [(f"{effect.id}.{p.name}", effect.neutral(p.name)) for p in effect.term.parameters]
-
-
-def slot_table(count: int, own: Sequence[OwnEffect] = ()) -> NDArray[np.float64]:
-    """Numbers of `count` lanes, shape [count, slot_count] (`slot_places`): nothing acts, and no length is zero."""
-    off = [value for effect in own for _, value in _own_slots(effect)]
-    table = np.zeros((count, len(SLOTS) + len(off)))
-    table[:, len(SLOTS) :] = off
-    lengths = [effect.lengths for effect in _LIBRARY]
-    for name, value in [pair for given in (_NEVER_ZERO, *lengths) for pair in given.items()]:
-        table[:, _SLOT[name]] = value
-    return table
 
 
 def push(numbers: NDArray[np.float64], lane_path: NDArray[np.int32], starts: NDArray[np.int32],
@@ -149,7 +97,7 @@ def _push(
     followed, first = np.unique(lane_path, return_index=True)
     like = np.zeros(len(starts) - 1, dtype=np.int32)
     like[followed] = first
-    scale, shift = (np.repeat(numbers[like, _SLOT[name]], np.diff(starts)) for name in ("speed_scale", "shift_speed"))
+    scale, shift = (np.repeat(numbers[like, PLACES[name]], np.diff(starts)) for name in ("speed_scale", "shift_speed"))
     ways = np.tanh((speed + shift) / scale)
     lanes = (np.ascontiguousarray(numbers), lane_path.astype(np.int32), starts.astype(np.int32), like, begins)
     kernel(*lanes, times, depth, speed, ways, out)
@@ -167,9 +115,9 @@ def fall(numbers: NDArray[np.float64], lane_path: NDArray[np.int32], starts: NDA
     ensure()
     longest = int(np.diff(starts).max())
     out = np.zeros((len(numbers), longest, 4))
-    held = np.abs(numbers[:, _SLOT[_HELD]]) / numbers[:, _SLOT[_REACH]]
-    rate = np.sqrt((np.maximum(numbers[:, _SLOT["stiffness"]], 1e-9) + held) / numbers[:, _SLOT["mass"]])
-    rate += np.abs(numbers[:, _SLOT["damping"]]) / numbers[:, _SLOT["mass"]]
+    held = np.abs(numbers[:, PLACES[_HELD]]) / numbers[:, PLACES[_REACH]]
+    rate = np.sqrt((np.maximum(numbers[:, PLACES["stiffness"]], 1e-9) + held) / numbers[:, PLACES["mass"]])
+    rate += np.abs(numbers[:, PLACES["damping"]]) / numbers[:, PLACES["mass"]]
     steps = np.minimum(_STEP, _TURN / rate)
     numbers, steep = _risen(numbers)
     steps = np.minimum(steps, steep)
@@ -186,15 +134,15 @@ def _risen(numbers: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[n
     of 2.8 of these times; it takes steps of one. Where that is shorter than `_SHORTEST`, w is as large as it resolves:
     there the friction is all but a constant one.
     """
-    bound = np.abs(numbers[:, [_SLOT[name] for name in _STEEP]]).sum(axis=1)
-    speed = numbers[:, _SLOT[_RISE]]
+    bound = np.abs(numbers[:, [PLACES[name] for name in _STEEP]]).sum(axis=1)
+    speed = numbers[:, PLACES[_RISE]]
     steep = (bound > 0.0) & (speed > 0.0)
     if not steep.any():
         return numbers, np.full(len(numbers), np.inf)
-    slowing = bound / numbers[:, _SLOT["mass"]]  # [m/s2]
+    slowing = bound / numbers[:, PLACES["mass"]]  # [m/s2]
     risen = numbers.copy()
-    risen[steep, _SLOT[_RISE]] = np.maximum(speed, slowing * _SHORTEST)[steep]
-    own = np.divide(risen[:, _SLOT[_RISE]], slowing, out=np.full(len(numbers), np.inf), where=steep)
+    risen[steep, PLACES[_RISE]] = np.maximum(speed, slowing * _SHORTEST)[steep]
+    own = np.divide(risen[:, PLACES[_RISE]], slowing, out=np.full(len(numbers), np.inf), where=steep)
     return risen, own
 
 
@@ -206,9 +154,9 @@ def _parts(own: _Own) -> list[tuple[Mapping[str, Callable[..., Any]], Mapping[st
     """Hooks of every effect, the library's first, and the places in a lane of the numbers that they ask for."""
     at = len(SLOTS)
     parts: list[tuple[Mapping[str, Callable[..., Any]], Mapping[str, int]]]
-    parts = [(effect.law, _SLOT) for effect in _LIBRARY]
+    parts = [(effect.law, PLACES) for effect in LIBRARY]
     for term, law in own:
-        names = tuple(p.name for p in term.parameters) if law is None else _slots_of(law)
+        names = tuple(p.name for p in term.parameters) if law is None else slots_of(law)
         functions = term.hooks if law is None else law.law
         parts.append((functions, {name: at + place for place, name in enumerate(names)}))
         at += len(names)
@@ -225,7 +173,7 @@ def given_way(lane: NDArray[np.float64], gone: NDArray[np.float64] | None, depth
     after = np.zeros(len(law)) if gone is None else np.array(gone)
     for k, share in _turns(len(law)):
         hook, columns = law[k][0]["settle"], law[k][1]
-        asked = list(inspect.signature(hook).parameters)[len(_VALUES["settle"]) :]
+        asked = list(inspect.signature(hook).parameters)[len(VALUES["settle"]) :]
         others = float(after.sum() - after[k])
         after[k] = hook(float(after[k]), depth - others, share * span, *(float(lane[columns[name]]) for name in asked))
     return after
@@ -263,7 +211,7 @@ def _changes(own: _Own) -> tuple[int, list[Any]]:
     what the terms of effects from files make of the spring's force, and the force that they add. Before them: how many
     effects make the bed give way."""
     hooks: dict[str, Callable[..., Any]] = {}
-    calls: dict[str, list[str]] = {name: [] for name in (*_VALUES, "own_spring", "own_force")}
+    calls: dict[str, list[str]] = {name: [] for name in (*VALUES, "own_spring", "own_force")}
     settling: list[tuple[str, str]] = []
     for place, (functions, columns) in enumerate(_parts(own)):
         for hook, function in functions.items():
@@ -274,9 +222,9 @@ def _changes(own: _Own) -> tuple[int, list[Any]]:
                 numbers = "".join(f", n[{columns[name]}]" for name in asked[len(FIXED_ARGUMENTS[hook]) :])
                 calls[where] += [line.format(called, numbers) for line in lines]
             elif hook == "settle":
-                settling.append((called, "".join(f", n[{columns[name]}]" for name in asked[len(_VALUES[hook]) :])))
+                settling.append((called, "".join(f", n[{columns[name]}]" for name in asked[len(VALUES[hook]) :])))
             else:
-                arguments = (name if name in _VALUES[hook] else f"n[{columns[name]}]" for name in asked)
+                arguments = (name if name in VALUES[hook] else f"n[{columns[name]}]" for name in asked)
                 calls[hook].append(f"{called}({', '.join(arguments)})")
     for at, share in _turns(len(settling)):
         called, numbers = settling[at]
@@ -295,7 +243,7 @@ def _changes(own: _Own) -> tuple[int, list[Any]]:
             ["gone = before", *calls["settle"], "return gone"],
         f"mass_changed(z, x, reference, {n})":
             ["total = 0.0", *(f"total = total + {call}" for call in calls["mass"]), "return total"],
-        f"force_changed(before, {', '.join(_HERE)}, {n})":
+        f"force_changed(before, {', '.join(HERE)}, {n})":
             ["total = before", *(f"total = total + {call}" for call in calls["force"]),
              *(f"total = total - {call}" for call in calls["pull"]), "return total"],
         f"own_spring(s, z, spring, {n})": ["force = spring", *calls["own_spring"], "return force"],
@@ -314,9 +262,9 @@ def _functions(own: _Own) -> tuple[int, Any, Any, Any, Any]:
         loading_changed, unload_changed, damper_changed, settled, mass_changed, force_changed, own_spring, own_force,
     ) = _changes(own)  # fmt: skip
     OWN = any(law is None for _, law in own)
-    MASS, GRAVITY, STIFFNESS, DAMPING = (_SLOT[name] for name in ("mass", "gravity", "stiffness", "damping"))
-    UNLOAD_CHANGE = _SLOT["unload_change"]
-    REFERENCE, RADIUS_DEPTH, HELD, REACH = (_SLOT[name] for name in ("reference", "radius_depth", _HELD, _REACH))
+    MASS, GRAVITY, STIFFNESS, DAMPING = (PLACES[name] for name in ("mass", "gravity", "stiffness", "damping"))
+    UNLOAD_CHANGE = PLACES["unload_change"]
+    REFERENCE, RADIUS_DEPTH, HELD, REACH = (PLACES[name] for name in ("reference", "radius_depth", _HELD, _REACH))
 
     @ti.func
     def loading(z: ti.f64, n: ti.template()) -> ti.f64:
@@ -370,10 +318,10 @@ def _kernels(own: _Own) -> tuple[Any, Any]:
     from hedgebed_taichi import ti
 
     settling, force, taken, settled, carried = _functions(own)
-    GIVEN_WAY, HELD = _SLOT["given_way"], _SLOT[_HELD]
-    MASS, GRAVITY, SPEED_SCALE, SETTLED = _SLOT["mass"], _SLOT["gravity"], _SLOT["speed_scale"], _SETTLED
-    SHIFT_DEPTH, SHIFT_ROW, SHIFT_SPEED = (_SLOT[name] for name in ("shift_depth", "shift_row", "shift_speed"))
-    COUNT = len(SLOTS) + sum(len(p.parameters) if q is None else len(_slots_of(q)) for p, q in own)
+    GIVEN_WAY, HELD = PLACES["given_way"], PLACES[_HELD]
+    MASS, GRAVITY, SPEED_SCALE, SETTLED = PLACES["mass"], PLACES["gravity"], PLACES["speed_scale"], _SETTLED
+    SHIFT_DEPTH, SHIFT_ROW, SHIFT_SPEED = (PLACES[name] for name in ("shift_depth", "shift_row", "shift_speed"))
+    COUNT = len(SLOTS) + sum(len(p.parameters) if q is None else len(slots_of(q)) for p, q in own)
     Table = ti.types.ndarray(dtype=ti.f64, ndim=2)
     Line = ti.types.ndarray(dtype=ti.f64, ndim=1)
     Whole, Long = (ti.types.ndarray(dtype=dtype, ndim=1) for dtype in (ti.i32, ti.i64))

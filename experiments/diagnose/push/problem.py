@@ -9,7 +9,7 @@ start and scored on depth and acceleration.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -20,36 +20,26 @@ from experiments.campaign import Campaign, EffectTable, PenetrationCampaign, wri
 from experiments.diagnose.core.effect_texts import push_advice
 from experiments.diagnose.fit.forms import PENETRATION_HOOKS, OwnEffect, shapes_of
 from experiments.diagnose.fit.localise import acceleration
-from experiments.diagnose.fit.problem import (
-    Array,
-    Estimate,
-    Finding,
-    Form,
-    Planned,
-    Problem,
-    Samples,
-    TrialInfo,
-    Values,
-)
+from experiments.diagnose.fit.problem import Array, Estimate, Finding, Form, Problem, Values
+from experiments.diagnose.fit.trials import Planned, Samples, TrialInfo
 from experiments.diagnose.noise.jitter import Shaken
 
-from .beds import centred, scatter_parameters
+from .beds import OWN, centred, own_numbers, scatter_parameters
 from .data import Prepared, of_drop, prepare, stds, tip_depth
 from .depth import SmoothDepth
 from .design import best_push
-from .doubt import bounded, off_rest, off_surface, path_error, reversing, touching, turning
+from .doubt import bounded, jumping, off_rest, off_surface, path_error, reversing, touching, turning
 from .forms import physical, push_forms, unit_of
-from .law import PHASES, SLOTS, fall, push_each, slot_places, slot_table
+from .law import PHASES, fall, push_each
 from .model_file import Pairs, model_of, range_of
 from .parameters import base_parameters, comes_back, diameters_of, find_scales, named, speeds_of
 from .remarks import SURE, Push, at_one_speed, contradict, facts, highest_dampings, how_to_determine
+from .slots import PLACES, slot_places, slot_table
 from .zeros import find_force_zeros
 
 __all__ = ["PenetrationProblem", "make_problem"]
 
-_SLOT = {name: place for place, name in enumerate(SLOTS)}
 Asked = Sequence[tuple[Sequence[Values], Sequence[Form]]]  # points, and the forms that they are points of
-_OWN = ("bed", "bed damping", "bed unloading", "depth zero")  # numbers of a trial alone that its lanes hold
 _SHALLOW = 0.02  # share of D that counts as just below the surface
 
 
@@ -131,21 +121,21 @@ class PenetrationProblem(Problem):
     def _fill(self, trials: Sequence[Prepared], asked: Asked, into: Array) -> None:
         """Fill the slots of lanes, shape [trials, points, slot_count]; points in the order of `asked`."""
         for trial, lanes in zip(trials, into, strict=True):
-            lanes[:, _SLOT["mass"]] = self.tables.spike.mass or 1.0
-            lanes[:, _SLOT["gravity"]] = trial.table.gravity
-            lanes[:, _SLOT["radius_depth"]] = tip_depth(self.tables.spike, trial.diameter)
+            lanes[:, PLACES["mass"]] = self.tables.spike.mass or 1.0
+            lanes[:, PLACES["gravity"]] = trial.table.gravity
+            lanes[:, PLACES["radius_depth"]] = tip_depth(self.tables.spike, trial.diameter)
             if trial.smooth is not None:
-                lanes[:, _SLOT["speed_scale"]] = trial.smooth.slow
-        into[..., _SLOT["reference"]] = self._scales.depth
+                lanes[:, PLACES["speed_scale"]] = trial.smooth.slow
+        into[..., PLACES["reference"]] = self._scales.depth
         every = [values for points, _ in asked for values in points]
         given = set[str]().union(*every)
-        bed, damper, unloading, zero = (_own(every, kind, trials, given) for kind in _OWN)
+        bed, damper, unloading, zero = (own_numbers(every, kind, trials, given) for kind in OWN)
         k, c = (self._of_each(every, which, trials) for which in ("stiffness", "damping"))
-        into[..., _SLOT["stiffness"]] = stiffness = k * (1.0 + bed)
-        into[..., _SLOT["damping"]] = c * (1.0 + bed) * (1.0 + damper)
-        into[..., _SLOT["unload_change"]] = unloading
+        into[..., PLACES["stiffness"]] = stiffness = k * (1.0 + bed)
+        into[..., PLACES["damping"]] = c * (1.0 + bed) * (1.0 + damper)
+        into[..., PLACES["unload_change"]] = unloading
         if trials[0].driven:
-            into[..., _SLOT["shift_depth"]] = -zero
+            into[..., PLACES["shift_depth"]] = -zero
         sizes, start = np.array([[trial.diameter / self._middle] for trial in trials]), 0
         for points, forms in asked:
             rows = slice(start, start := start + len(points))
@@ -166,7 +156,7 @@ class PenetrationProblem(Problem):
         """Name of the file that an effect is from; None for the library's."""
         return next((effect.file.name for effect in self.own if effect.id == form.effect), None)
 
-    def _has_own(self, forms: Sequence[Form]) -> bool:
+    def _hasown_numbers(self, forms: Sequence[Form]) -> bool:
         """Whether one of the effects is from a file."""
         return bool(self.own) and any(self._file(form) for form in forms)
 
@@ -191,17 +181,17 @@ class PenetrationProblem(Problem):
         """The same of points that have forms of their own, all or none of them from files; one after another."""
         count = sum(len(points) for points, _ in asked)
         # Effects from files are compiled in where one of them is on: another kernel.
-        own = self.own if self._has_own(asked[0][1]) else ()
+        own = self.own if self._hasown_numbers(asked[0][1]) else ()
         numbers = slot_table(count * len(trials), own)
         self._fill(trials, asked, numbers.reshape(len(trials), count, -1))
-        numbers[:, _SLOT["shift_depth"]] += shifts[0]
-        numbers[:, _SLOT["shift_speed"]], numbers[:, _SLOT["shift_row"]] = shifts[1:]
+        numbers[:, PLACES["shift_depth"]] += shifts[0]
+        numbers[:, PLACES["shift_speed"]], numbers[:, PLACES["shift_row"]] = shifts[1:]
         starts = np.cumsum([0, *(len(trial.time) for trial in trials)]).astype(np.int32)
         if trials[0].driven:
             depth, speed = (np.concatenate([getattr(t.path, name) for t in trials]) for name in ("depth", "speed"))
             out = push_each(numbers, starts, depth, speed, own, np.concatenate([trial.time for trial in trials]))
             every = [values for points, _ in asked for values in points]
-            zeros = _own(every, "force zero", trials, set[str]().union(*every))
+            zeros = own_numbers(every, "force zero", trials, set[str]().union(*every))
             return [one + zero[:, None] if zero.any() else one for one, zero in zip(out, zeros, strict=True)]
         lanes = np.repeat(np.arange(len(trials), dtype=np.int32), count)
         speeds = np.array([trial.table.speed or 0.0 for trial in trials])
@@ -214,7 +204,7 @@ class PenetrationProblem(Problem):
         """Whitened residuals, of all of their time."""
         found: list[list[dict[str, Array]]] = [[] for _ in asked]
         for own in (False, True):
-            mine = [k for k, (points, forms) in enumerate(asked) if points and self._has_own(forms) == own]
+            mine = [k for k, (points, forms) in enumerate(asked) if points and self._hasown_numbers(forms) == own]
             residuals: dict[str, Array] = {}
             for driven in (True, False):
                 chosen = [self.prepared[id] for id in trials if self.prepared[id].driven == driven]
@@ -280,19 +270,11 @@ class PenetrationProblem(Problem):
             factor = path_error(smooth, by_depth, by_row) + by_speed[:, None] * smooth.speed_error
             if self._zeros is not None:
                 factor = np.column_stack([factor, np.full(len(factor), self._zeros.std)])
-            # Where the error may cross the surface or the turning point, the force is no linear function of it.
-            bend = np.abs(by_speed).max() * smooth.speed_std * (np.abs(smooth.speed) < 3 * smooth.speed_std)
-            jump = float(np.abs(by_speed).max() * np.abs(smooth.speed).max())
-            # An effect may begin with a jump at the surface: as large as the force is measured to be just below it.
-            depth_here = np.maximum(8 * smooth.depth_std, _SHALLOW * self._scales.depth)
-            shallow = (smooth.depth > 0) & (smooth.depth < depth_here) & trial.has_other
-            below = float(np.median(np.abs(trial.other[shallow]))) if shallow.any() else 0.0
-            start = max(jump, below) + np.abs(by_depth).max() * smooth.depth_std
-            touch = start * touching(trial)
+            jumps = jumping(trial, by_depth, by_speed, _SHALLOW * self._scales.depth)
             rows = trial.has_other
             turn, held = turning(smooth.speed[rows], smooth.speed_std[rows], trial.other[rows], std_force)
             shaken = self._along.get(trial.info.id, 0.0)
-            doubtful = np.sqrt(1 + ((bend**2 + touch**2)[rows] + turn**2) / std_force**2 + shaken**2)
+            doubtful = np.sqrt(1 + (jumps[rows] + turn**2) / std_force**2 + shaken**2)
             factor = np.column_stack([factor[rows], held])
             left, sizes, _ = np.linalg.svd(factor / std_force / doubtful[:, None], full_matrices=False)
             kept = sizes > 1e-3
@@ -507,13 +489,3 @@ class PenetrationProblem(Problem):
             depth=max(float(trial.path.depth.max()) for trial in driven),
             rows=int(np.median([trial.has_other.sum() for trial in driven])),
         )  # fmt: skip
-
-
-def _own(points: Sequence[Values], kind: str, trials: Sequence[Prepared], given: Container[str]) -> Array:
-    """A number of each trial's own at each point, 0 where there is none, shape [trials, points]. `given`: the names
-    that some point has."""
-    found = np.zeros((len(trials), len(points)))
-    for own, name in zip(found, (f"{kind}[{trial.info.id}]" for trial in trials), strict=True):
-        if name in given:
-            own[:] = [values.get(name, 0.0) for values in points]
-    return found

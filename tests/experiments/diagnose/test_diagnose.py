@@ -17,7 +17,7 @@ from experiments.cli.main import main
 from experiments.diagnose.core.diagnosis import diagnose
 from experiments.diagnose.core.renoised import whitened_fit
 from experiments.diagnose.fit.fitting import Model, Whitener
-from experiments.diagnose.fit.problem import TrialInfo
+from experiments.diagnose.fit.trials import TrialInfo
 from experiments.diagnose.noise.replicates import odd_trials, split_trials
 from experiments.diagnose.push.problem import make_problem
 from experiments.diagnose.report.document import document
