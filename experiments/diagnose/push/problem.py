@@ -189,10 +189,10 @@ class PenetrationProblem(Problem):
         starts = np.cumsum([0, *(len(trial.time) for trial in trials)]).astype(np.int32)
         if trials[0].driven:
             depth, speed = (np.concatenate([getattr(t.path, name) for t in trials]) for name in ("depth", "speed"))
-            out = push_each(numbers, starts, depth, speed, own, np.concatenate([trial.time for trial in trials]))
+            forces = push_each(numbers, starts, depth, speed, own, np.concatenate([trial.time for trial in trials]))
             every = [values for points, _ in asked for values in points]
             zeros = own_numbers(every, "force zero", trials, set[str]().union(*every))
-            return [one + zero[:, None] if zero.any() else one for one, zero in zip(out, zeros, strict=True)]
+            return [one + zero[:, None] if zero.any() else one for one, zero in zip(forces, zeros, strict=True)]
         lanes = np.repeat(np.arange(len(trials), dtype=np.int32), count)
         speeds = np.array([trial.table.speed or 0.0 for trial in trials])
         out = fall(numbers, lanes, starts, np.concatenate([trial.time for trial in trials]), speeds, own)

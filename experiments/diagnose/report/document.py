@@ -43,6 +43,7 @@ __all__ = ["document", "write_diagnosis"]
 
 COUNTS = tomllib.loads(Path(__file__).with_name("counts.toml").read_text(encoding="utf-8"))
 _BESIDE = 2  # readings to either side of the deepest one, with which its force is averaged
+_SAME = 1 - 1e-9  # share of the largest force from which on one is as large
 _ROUNDS = 8  # of refits without one of the effects
 _SIGNALS = ("force", "accel", "ax", "ay")  # channels that read 0 where nothing pushes: a change is a share of these
 
@@ -192,8 +193,9 @@ def _own_force(found: Diagnosis, rest: tuple[Form, ...]) -> dict[str, Any] | Non
         if "depth_m" not in whole or not len(whole["depth_m"]):
             continue
         own = whole["model"] - found.problem.compare(found.best_values, rest, trial)["force"]["model"]
-        place = int(np.argmax(np.abs(np.nan_to_num(own))))
-        if most is None or abs(own[place]) > abs(most["force_N"]):
+        sizes = np.abs(np.nan_to_num(own))
+        place = int(np.argmax(sizes > _SAME * sizes.max()))  # on a stiffer way back all rows may have the largest
+        if most is None or _SAME * abs(own[place]) > abs(most["force_N"]):
             most = {"trial": trial, "depth_m": float(whole["depth_m"][place]), "force_N": float(own[place]),
                     "of_N": float(whole["model"][place])}  # fmt: skip
     return most
