@@ -70,7 +70,8 @@ def reversing(trial: Prepared) -> NDArray[np.bool_]:
 
 def jumping(trial: Prepared, by_depth: Array, by_speed: Array, shallow: float) -> Array:
     """By how much the force is in doubt where its error may cross the surface or the turning point, as a variance [N2],
-    shape [n]: there it is no linear function of the depth's. `shallow`: depth [m] up to which a tip counts as just below the surface."""
+    shape [n]: there it is no linear function of the depth's. `shallow`: depth [m] up to which a tip counts as just
+    below the surface."""
     smooth = trial.path
     bend = np.abs(by_speed).max() * smooth.speed_std * (np.abs(smooth.speed) < 3 * smooth.speed_std)
     jump = float(np.abs(by_speed).max() * np.abs(smooth.speed).max())

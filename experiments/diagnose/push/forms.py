@@ -78,9 +78,9 @@ def physical(
         return value * stiffness * scales.depth
     factor = size if slot.how in ("perimeter", "viscous") else size**2
     if slot.how == "drag":
-        factor /= scales.speed**2
+        factor = factor / scales.speed**2
     elif slot.how == "viscous":
-        factor /= scales.speed
+        factor = factor / scales.speed
     return value * scales.force * factor
 
 
