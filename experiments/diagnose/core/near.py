@@ -61,9 +61,11 @@ def nearest_each(found: Diagnosis) -> tuple[Near, ...]:
 
 
 def near_models(found: Diagnosis, nearest: Sequence[Near]) -> list[Diagnosis]:
-    """Other answers in the place of the best, each as the diagnosis with that fit. With other effects: of an ambiguous
-    one those that trials cannot distinguish, of a named one the `nearest` that are less than `LEAD` behind, by evidence
-    and by prediction. With the same effects in other forms: the likeliest, less than `LEAD` behind by evidence."""
+    """Other answers in the place of the best, each as the diagnosis with that fit.
+
+    With other effects: of an ambiguous one those that trials cannot distinguish. Of a named one the `nearest` that are
+    less than `LEAD` behind, by evidence and by prediction. With the same effects: other forms (`other_forms`).
+    """
     if found.choice is None:
         return []
     close = [near.hypothesis for near in nearest if max(near.behind, near.behind_left_out or 0.0) < LEAD]
@@ -77,8 +79,8 @@ def near_models(found: Diagnosis, nearest: Sequence[Near]) -> list[Diagnosis]:
 
 
 def other_forms(found: Diagnosis) -> list[Hypothesis]:
-    """The likeliest fits of the named effects in other forms that evidence does not exclude, the likeliest first; one
-    of each set of forms."""
+    """The likeliest fits of the named effects in other forms, less than `LEAD` behind by evidence, the likeliest first.
+    One of each set of forms."""
     choice = found.choice
     if choice is None or found.verdict not in ("named", "ambiguous"):
         return []
