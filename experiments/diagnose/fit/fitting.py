@@ -173,8 +173,7 @@ def fit(model: Model, start: Values | None = None, *, rounds: int = Rule.rounds)
 
 def fit_each(starts: Sequence[tuple[Model, Values | None]], *, rounds: int = Rule.rounds) -> list[Fit]:
     """`fit` of each model from its start, carried out together."""
-    rule = Rule(rounds=rounds)
-    return fits([(model, _begun(model, start), rule) for model, start in starts])
+    return fits([(model, _begun(model, start), Rule(rounds=rounds)) for model, start in starts])
 
 
 def fits(starts: Sequence[tuple[Model, Values, Rule]]) -> list[Fit]:
@@ -224,8 +223,7 @@ def _descent(model: Model, start: Values, rule: Rule) -> _Walk[Fit]:
     parameters = model.parameters
     scales = np.array([p.scale for p in parameters])
     low, high = np.array([p.lowest for p in parameters]), np.array([p.highest for p in parameters])
-    middle = np.array([p.value for p in parameters])
-    precision = np.array([p.std**-2 for p in parameters])
+    middle, precision = np.array([p.value for p in parameters]), np.array([p.std**-2 for p in parameters])
     x = np.clip(_numbers(parameters, start), low, high)
     names = [p.name for p in parameters]
     unturned = model.unturned  # modes are needed at the end only: steps follow from their products
@@ -237,8 +235,7 @@ def _descent(model: Model, start: Values, rule: Rule) -> _Walk[Fit]:
         return float((precision * (values - middle) ** 2).sum())
 
     best: Array | None = None
-    jacobian = np.zeros((0, len(x)))
-    free = np.ones(len(x), dtype=bool)
+    jacobian, free = np.zeros((0, len(x))), np.ones(len(x), dtype=bool)
     for number, share in enumerate(rule.shares):
         part, whole, best = replace(unturned, share=share) if share < 1 else unturned, share >= 1, None
         if number or rule.scan:
@@ -287,7 +284,6 @@ def _step(
     at_bounds: tuple[NDArray[np.bool_], NDArray[np.bool_]], times: int,
 ) -> Array:  # fmt: skip
     """The damped step of the free parameters, found so many `times`, what runs into a bound at once left out."""
-    step = np.zeros(len(gradient))
     for _ in range(times):
         mine = hessian[np.ix_(free, free)]
         diagonal = np.diag(np.maximum(np.diag(mine), 1e-12))

@@ -5,7 +5,6 @@ import math
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,13 +78,15 @@ def prepare(campaign: Campaign) -> tuple[list[Prepared], list[Finding]]:
     for key, recording in campaign.recordings.items():
         for name, column in recording.columns.items():
             digest.update(repr((key, name)).encode() + column.tobytes())
-    if _KEPT.get("of") != digest.digest():
-        _KEPT.update(of=digest.digest(), found=_prepared(campaign))
-    trials, findings = _KEPT["found"]
+    if (key := digest.digest()) not in _KEPT:
+        found = _prepared(campaign)
+        _KEPT.clear()
+        _KEPT[key] = found
+    trials, findings = _KEPT[key]
     return list(trials), list(findings)
 
 
-_KEPT: dict[str, Any] = {}  # digest of a campaign, and its trials and findings as they were prepared
+_KEPT: dict[bytes, tuple[list[Prepared], list[Finding]]] = {}  # by the digest of the campaign
 
 
 def _prepared(campaign: Campaign) -> tuple[list[Prepared], list[Finding]]:
