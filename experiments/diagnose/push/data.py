@@ -75,9 +75,9 @@ def prepare(campaign: Campaign) -> tuple[list[Prepared], list[Finding]]:
     Raises ValueError where no trial is left, or a sensor that is scored has no noise.
     """
     digest = hashlib.sha256(repr(campaign.tables).encode())
-    for key, recording in campaign.recordings.items():
+    for of, recording in campaign.recordings.items():
         for name, column in recording.columns.items():
-            digest.update(repr((key, name)).encode() + column.tobytes())
+            digest.update(repr((of, name)).encode() + column.tobytes())
     if (key := digest.digest()) not in _KEPT:
         found = _prepared(campaign)
         _KEPT.clear()
