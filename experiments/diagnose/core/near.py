@@ -80,14 +80,14 @@ def near_models(found: Diagnosis, nearest: Sequence[Near]) -> list[Diagnosis]:
 
 def other_forms(found: Diagnosis) -> list[Hypothesis]:
     """The likeliest fits of the named effects in other forms, less than `LEAD` behind by evidence, the likeliest first.
-    One of each set of forms."""
+    One of each set of forms, and none that is the best model with one more form: that one predicts much the same."""
     choice = found.choice
     if choice is None or found.verdict not in ("named", "ambiguous"):
         return []
     likeliest: dict[frozenset[str], Hypothesis] = {}
     for one in sorted(choice.table, key=lambda one: -one.score):
         near = one.score > choice.best.score - LEAD and set(one.effects) == set(choice.best.effects)
-        if near and (forms := _ids(one.forms)) != _ids(found.forms):
+        if near and not (forms := _ids(one.forms)) >= _ids(found.forms):
             likeliest.setdefault(forms, one)
     return list(likeliest.values())[:_MOST_FORMS]
 

@@ -293,7 +293,9 @@ def test_the_same_effect_in_another_form_has_a_model_where_evidence_does_not_exc
     fitted = fit(found.best.model.with_forms([form]), found.best.values)
     for behind, written in ((9.0, True), (11.0, False)):
         other, worse = (Hypothesis(fitted, found.choice.best.score - behind - more) for more in (0.0, 0.5))
-        one = replace(found, choice=replace(found.choice, rivals=(), table=(worse, found.choice.best, other)))
+        more = Hypothesis(replace(fitted, model=fitted.model.with_forms([*found.forms, form])), other.score)
+        table = (worse, more, found.choice.best, other)
+        one = replace(found, choice=replace(found.choice, rivals=(), table=table))
         assert other_forms(one) == ([other] if written else [])  # one of each form, the likeliest
         rows = _write_near_models(tmp_path, one, nearest_each(one))
         file = "model-depth-hardening-quadratic.toml"
