@@ -32,7 +32,8 @@ from experiments.runs.result import Result, quantity
 from experiments.runs.types import Json
 from experiments.runs.whole_runs import computed_run
 
-from .fit.problem import Finding, TrialInfo
+from .fit.problem import Finding
+from .fit.trials import TrialInfo
 from .noise.replicates import has_replicates
 from .report.sentences import findings_in_words, say
 from .settings import CheckSettings

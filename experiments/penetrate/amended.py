@@ -24,7 +24,8 @@ from experiments.campaign.model_errors import ModelErrors, bias_words, errors_of
 from experiments.campaign.tables import BASE_NOTE, PEAKS_NOTE, RANGE_NOTE, SCATTER_NOTE, EffectTable
 from experiments.diagnose.fit.forms import OwnEffect, load_own
 from experiments.diagnose.push.forms import push_forms
-from experiments.diagnose.push.law import PHASES, SLOTS, fall, given_way, push, slot_places, slot_table
+from experiments.diagnose.push.law import PHASES, fall, given_way, push
+from experiments.diagnose.push.slots import SLOTS, slot_places, slot_table
 from experiments.runs.folder import RunFolder
 from experiments.runs.result import quantities_of
 from experiments.runs.types import Json

@@ -7,7 +7,7 @@ from itertools import groupby
 import numpy as np
 
 from experiments.diagnose.fit.evidence import Hypothesis, best_starts, excess
-from experiments.diagnose.fit.fitting import Fit, Model, fit, fit_each
+from experiments.diagnose.fit.fitting import Fit, Model, Rule, fit, fit_each
 from experiments.diagnose.fit.gate import Verdict, open_gate
 from experiments.diagnose.fit.problem import Finding, Form, Values
 
@@ -51,6 +51,7 @@ class CandidateFits:
         self._recoloured = recoloured
         self.table: list[Hypothesis] = []
         self._alone: dict[str, Fit] = {}
+        self._made: dict[tuple[object, ...], Fit] = {}
         self._most = self.base.score  # of the best single form
 
     def _gate(self, hypothesis: Hypothesis) -> Verdict:
@@ -71,6 +72,16 @@ class CandidateFits:
         self.table.append(Hypothesis.of(found))
         return self.table[-1]
 
+    def _fit_each(self, starts: Sequence[tuple[Model, Values]], *, rounds: int = Rule.rounds) -> list[Fit]:
+        """`fit_each`, without what this search has fitted before from the same start: where an exchange of effects has
+        changed nothing, all that is tried beside them was tried. Fits of contacts are made anew."""
+        keys = [_start_of(model, values, rounds) for model, values in starts]
+        known = {} if self.base.fit.model.problem.contacts is not None else self._made
+        fresh = {key: start for key, start in zip(keys, starts, strict=True) if key not in known}
+        known = known | dict(zip(fresh, fit_each(list(fresh.values()), rounds=rounds), strict=True))
+        self._made |= {key: known[key] for key in fresh}
+        return [known[key] for key in keys]
+
     def _try(self, start: Hypothesis, forms: Sequence[Form], *, most: int | None = None) -> list[Hypothesis]:
         """`start` with each of `forms` added, all refitted; `most`: only so many, those that leave least when begun."""
         fresh = [form for form in forms if form.id not in self._alone]
@@ -81,11 +92,11 @@ class CandidateFits:
                 model: Model = start.fit.model.with_forms((*start.forms, form))
                 begun += [(form, model, place) for place in self._places(start, form)]
         short: dict[str, Fit] = {}
-        for (form, _, _), one in zip(begun, fit_each([(m, v) for _, m, v in begun], rounds=4), strict=True):
+        for (form, _, _), one in zip(begun, self._fit_each([(m, v) for _, m, v in begun], rounds=4), strict=True):
             if form.id not in short or one.objective < short[form.id].objective:
                 short[form.id] = one
         kept = sorted(short, key=lambda id: short[id].objective)[:most]
-        found |= dict(zip(kept, fit_each([(short[id].model, short[id].values) for id in kept]), strict=True))
+        found |= dict(zip(kept, self._fit_each([(short[id].model, short[id].values) for id in kept]), strict=True))
         if not start.forms:
             self._alone |= found
         return [self._kept(found[form.id]) for form in forms if form.id in found]
@@ -189,8 +200,7 @@ class CandidateFits:
             plain += [made for made in best.forms if made not in start.forms]
         return best
 
-    @staticmethod
-    def _fitted_bend(start: Fit, plain: Form, finer: Form) -> Fit:
+    def _fitted_bend(self, start: Fit, plain: Form, finer: Form) -> Fit:
         """With the `finer` form in place of the plain one."""
         model = start.model.with_forms([finer if form is plain else form for form in start.model.forms])
         known = {p.name for p in plain.parameters}
@@ -199,8 +209,8 @@ class CandidateFits:
         contacts = model.problem.contacts
         if contacts is not None:  # a bend alone may put trials on other branches: from their beginnings, too
             places += contacts.refine([model] * len(places), places)
-        begun = fit_each([(model, values) for values in places], rounds=3)
-        return fit(model, min(begun, key=lambda one: one.objective).values)
+        begun = self._fit_each([(model, values) for values in places], rounds=3)
+        return self._fit_each([(model, min(begun, key=lambda one: one.objective).values)])[0]
 
     def _siblings(self, hypothesis: Hypothesis) -> list[Hypothesis]:
         """Other forms of a single effect, alone: when bent, one that was behind may overtake the leading form."""
@@ -265,9 +275,9 @@ class CandidateFits:
         for share in (0.4, 0.7) if model.problem.rough else ():
             part = fit_each([(one.until(share), v) for one, v in zip(models, places, strict=True)], rounds=6)
             places = [one.values for one in part]
-        begun = fit_each(list(zip(models, places, strict=True)), rounds=5)
+        begun = self._fit_each(list(zip(models, places, strict=True)), rounds=5)
         begun.sort(key=lambda found: found.objective)
-        return [self._kept(found) for found in fit_each([(one.model, one.values) for one in begun[:FOLLOWED]])]
+        return [self._kept(found) for found in self._fit_each([(one.model, one.values) for one in begun[:FOLLOWED]])]
 
     def _in_all_forms(self) -> list[Hypothesis]:
         """Fits of pairs of effects on smooth trials: those pairs that leave least, in their best forms, bent or not.
@@ -302,6 +312,12 @@ class CandidateFits:
         """Forms of an effect, the one that did best alone first."""
         alone = [h for h in self.table if len(h.forms) == 1 and h.effects == (effect,)]
         return [h.forms[0] for h in sorted(alone, key=lambda h: -h.score)]
+
+
+def _start_of(model: Model, values: Values, rounds: int) -> tuple[object, ...]:
+    """What a fit in a search follows from: its forms, noise, numbers and steps."""
+    numbers = tuple(values.get(p.name, p.value) for p in model.parameters)
+    return (*(form.id for form in model.forms), id(model.whitener), model.trials, model.share, numbers, rounds)
 
 
 def _bends(found: Fit) -> list[tuple[Model, Values]]:

@@ -1,9 +1,9 @@
 """From a problem to a diagnosis: split, fit, gate, search, verdict. Independent of the kind of trials."""
 
 import itertools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from copy import deepcopy
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +23,7 @@ from . import deciding, matters, renoised, too_noisy
 from .outcome import Diagnosis, Known, finish
 from .pairs import FormsStart
 from .search import Choice, Search
+from .search_names import differ_words, named_search, new_in_course
 
 __all__ = ["diagnose"]
 
@@ -66,6 +67,7 @@ class _Asked:
     with_wander: bool = False  # the wander of replicates counts as noise: a test beside something unknown
     begun: _Begun | None = None  # from an earlier course of the same campaign
     patient: bool = False  # search further effects before trials may diverge
+    count: Iterator[int] = field(default_factory=itertools.count)  # of searches, through all courses
 
 
 class _Course:
@@ -96,7 +98,8 @@ class _Course:
         if self.first.passed:
             return self._nothing()
         begun = self.base
-        choice = self._chosen(may_diverge=not (asked.aside or asked.patient))
+        new = new_in_course(aside=asked.aside, looked_at=asked.looked_at, with_wander=asked.with_wander)
+        choice = self._chosen(new, may_diverge=not (asked.aside or asked.patient))
         if choice.diverging:
             self.tell("a trial goes its own way: once more without it", 0.0)
             if self._stands(anew := self._again(aside=choice.diverging, looked_at=asked.looked_at), choice.diverging):
@@ -193,15 +196,16 @@ class _Course:
         """Trials that diverge from a fit."""
         return diverging_trials(found, self.held_out, seed=self.asked.seed, recoloured=self._recoloured)
 
-    def _chosen(self, *, may_diverge: bool = False) -> Choice:
-        """A search, which may find a better base model. `may_diverge`: it stops where trials diverge from the best."""
+    def _chosen(self, new: str, *, may_diverge: bool = False) -> Choice:
+        """A search, with this `new` in it, which may find a better base model or stop where trials diverge from it."""
 
         def diverging(base: Fit, best: Fit) -> tuple[Finding, ...]:
             return self._diverging(base) or (self._diverging(best) if best.model.forms else ())
 
         kinds = frozenset(p.kind for p in self.base.model.scatter)
         find, pairs = diverging if may_diverge else None, self.pairs.get(kinds, ())
-        search = Search(self.base, tell=self.tell, seed=self.asked.seed, recoloured=self._recoloured, known=self.known,
+        tell = named_search(self.tell, next(self.asked.count), new)
+        search = Search(self.base, tell=tell, seed=self.asked.seed, recoloured=self._recoloured, known=self.known,
                         known_pairs=pairs, find_diverging=find)  # fmt: skip
         choice = search.choose()
         self.known, self.pairs[kinds] = self.known | search.alone, search.pairs
@@ -225,8 +229,7 @@ class _Course:
             choice = replace(choice, left=open_gate(other, seed=self.asked.seed)[1])
         if choice.left.passed and len(best.effects) == 1 and not choice.alternatives:
             return choice
-        self.tell("rows are weighed otherwise beside what was found: choosing again", 0.0)
-        return self._chosen()
+        return self._chosen("readings weighed by what was found")
 
     def _describes_motion(self, best: Hypothesis) -> bool:
         """Whether the best model has effects that leave noise rather than motion."""
@@ -241,10 +244,9 @@ class _Course:
         wander = renoised.wander_of(best.fit, self.held_out) if self.asked.with_wander else self.wander
         if set(scatter.model_std) == set(self.model_std) and not wander.other_than(self.wander):
             return choice
-        self.tell("replicates are found to differ otherwise: choosing again", 0.0)
         self.model_std, self.wander = scatter.model_std, wander
         self.base = renoised.coloured(renoised.calmed(renoised.rescattered(self.base, scatter), wander), self.colours)
-        return self._chosen()
+        return self._chosen(differ_words(scatter.model_std) if scatter.model_std else "replicates wander")
 
     def _scattered_beside(self, choice: Choice) -> Choice:
         """Where something is left, replicates are compared by what each has of its own."""
@@ -262,7 +264,6 @@ class _Course:
                 if other := self._without_name(scatter, choice):
                     return other
                 continue
-            self.tell("replicates are found to differ beside what is left: choosing again", 0.0)
             than = None if kinds == self.problem.force_scatter else choice
             choice = self._reweighed(self._chosen_with(scatter, than=than) or choice)
         return choice
@@ -280,21 +281,21 @@ class _Course:
                 found.append((scatter, renoised.rescattered(renoised.plain(self.base), scatter)))
         # Zeros of depth and force are next to the same in a stiff bed: the likeliest is asked first.
         for scatter, beside in sorted(found, key=lambda one: one[1].objective):
-            self.tell("trials differ at random and none repeats another: searching again with that as noise", 0.0)
             if choice.left.passed:
                 other = self._without_name(scatter, choice, beside)
             else:
-                other = self._chosen_with(scatter, beside)
+                other = self._chosen_with(scatter, beside, what="trials")
             if other:
                 self.findings.append(lone_finding(scatter))
                 return other
         return choice
 
-    def _chosen_with(self, scatter: Scatter, base: Fit | None = None, *, than: Choice | None = None) -> Choice | None:
+    def _chosen_with(self, scatter: Scatter, base: Fit | None = None, *, than: Choice | None = None,
+                     what: str = "replicates") -> Choice | None:  # fmt: skip
         """A choice anew beside `scatter`, kept where it explains all, or leaves less `than` another; else None, and all
         is as before. `base`: the base model's fit with it, the noise white, where that is known."""
         before = self._beside(scatter, base)
-        other = self._chosen()
+        other = self._chosen(differ_words(scatter.model_std, what))
         if other.left.passed if than is None else other.left.score < than.left.score:
             self.model_std = scatter.model_std
             return other
@@ -342,8 +343,7 @@ class _Course:
         known = {jitter.channels for jitter in self.jitters}
         self.jitters, self.base = jitters, fit(self.base.model, self.base.values)
         if {jitter.channels for jitter in jitters} != known:
-            self.tell("times are found to jitter: choosing again", 0.0)
-            return self._chosen()
+            return self._chosen("times jitter")
         left = open_gate(best, seed=self.asked.seed)[1]
         base = Hypothesis.of(self.base)
         return replace(choice, base=base, best=Hypothesis.of(best), left=left)

@@ -1,16 +1,20 @@
-"""The nearest other answers of a diagnosis, one for each effect that is named, by evidence and by prediction."""
+"""The nearest other answers of a diagnosis: one for each effect that is named, by evidence and by prediction, and the
+same effects in other forms."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from experiments.diagnose.fit.evidence import Hypothesis
 from experiments.diagnose.fit.fitting import fit, settled
+from experiments.diagnose.fit.problem import Form
 
 from .deciding import smallest, values_of_all
 from .outcome import Diagnosis
 from .rivals import CLOSE, LEAD, folds_of, predict
 
-__all__ = ["Near", "near_models", "nearest_each"]
+__all__ = ["Near", "near_models", "nearest_each", "other_forms"]
+
+_MOST_FORMS = 4  # models of the same effects in other forms: the likeliest of these show how far forms differ
 
 
 @dataclass(frozen=True)
@@ -56,16 +60,38 @@ def nearest_each(found: Diagnosis) -> tuple[Near, ...]:
     return tuple(nearest)
 
 
-def near_models(found: Diagnosis, nearest: Sequence[Near]) -> dict[tuple[str, ...], Diagnosis]:
-    """Other answers in the place of the best: effects -> the diagnosis with that fit. Of an ambiguous one those that
-    trials cannot distinguish. Of a named one the `nearest` that are less than `LEAD` behind, by evidence and by
-    prediction."""
+def near_models(found: Diagnosis, nearest: Sequence[Near]) -> list[Diagnosis]:
+    """Other answers in the place of the best, each as the diagnosis with that fit.
+
+    With other effects: of an ambiguous one those that trials cannot distinguish. Of a named one the `nearest` that are
+    less than `LEAD` behind, by evidence and by prediction. With the same effects: other forms (`other_forms`).
+    """
     if found.choice is None:
-        return {}
+        return []
     close = [near.hypothesis for near in nearest if max(near.behind, near.behind_left_out or 0.0) < LEAD]
     close += smallest(found.choice) if found.verdict == "ambiguous" else ()
-    models = {}
-    for one in close:
+    models = []
+    for one in (*close, *other_forms(found)):
         again = settled(fit(one.fit.model, one.fit.values))  # in the weights of the best model's last fit
-        models[found.ordered(one)] = replace(found, best=again, best_values=values_of_all(again, found.held_out))
+        effects, values = found.ordered(one), values_of_all(again, found.held_out)
+        models.append(replace(found, best=again, best_values=values, effects=effects))
     return models
+
+
+def other_forms(found: Diagnosis) -> list[Hypothesis]:
+    """The likeliest fits of the named effects in other forms, less than `LEAD` behind by evidence, the likeliest first.
+    One of each set of forms, and none that is the best model with one more form: that one predicts much the same."""
+    choice = found.choice
+    if choice is None or found.verdict not in ("named", "ambiguous"):
+        return []
+    likeliest: dict[frozenset[str], Hypothesis] = {}
+    for one in sorted(choice.table, key=lambda one: -one.score):
+        near = one.score > choice.best.score - LEAD and set(one.effects) == set(choice.best.effects)
+        if near and not (forms := _ids(one.forms)) >= _ids(found.forms):
+            likeliest.setdefault(forms, one)
+    return list(likeliest.values())[:_MOST_FORMS]
+
+
+def _ids(forms: Sequence[Form]) -> frozenset[str]:
+    """Which forms these are, in any order."""
+    return frozenset(form.id for form in forms)

@@ -13,7 +13,8 @@ from experiments.diagnose.fit.evidence import SMALL, Hypothesis, held_out_fit, i
 from experiments.diagnose.fit.fitting import Fit, fit, settled
 from experiments.diagnose.fit.gate import Verdict
 from experiments.diagnose.fit.localise import Place, depends_on, latent_table, places
-from experiments.diagnose.fit.problem import Array, Finding, Form, Planned, Problem
+from experiments.diagnose.fit.problem import Array, Finding, Form, Problem
+from experiments.diagnose.fit.trials import Planned
 from experiments.diagnose.noise.colour import Colour
 from experiments.diagnose.noise.jitter import Jitter
 from experiments.diagnose.noise.replicates import groups_of

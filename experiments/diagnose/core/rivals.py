@@ -25,7 +25,8 @@ import numpy as np
 from experiments.diagnose.fit.evidence import SMALL, Hypothesis, held_out_fit, inflation, slow_count, tempered
 from experiments.diagnose.fit.fitting import Fit, Linear, fit
 from experiments.diagnose.fit.gate import column_basis
-from experiments.diagnose.fit.problem import Array, Model, TrialInfo, Values
+from experiments.diagnose.fit.problem import Array, Model, Values
+from experiments.diagnose.fit.trials import TrialInfo
 from experiments.diagnose.noise.replicates import groups_of
 
 __all__ = ["CLOSE", "LEAD", "Predicted", "Rival", "compare", "folds_of", "marked", "predict"]

@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -83,11 +84,21 @@ class Fit:
 
     model: Model
     values: dict[str, float]
-    modes: Array  # residual modes, shape [n]
-    jacobian: Array  # d modes / d parameter / scale, shape [n, p]
+    rest: Array  # residual modes, shape [n], as `model.unturned` has them
+    slopes: Array  # d rest / d parameter / scale, shape [n, p]
     chi_square: float  # of the data alone
     penalty: float  # of the priors
     free: NDArray[np.bool_] = field(repr=False)  # parameters not held by a bound, shape [p]
+
+    @cached_property
+    def modes(self) -> Array:
+        """Residual modes, shape [n]."""
+        return self.rest if self.model.unturned is self.model else self.model.turned(self.rest)
+
+    @cached_property
+    def jacobian(self) -> Array:
+        """d modes / d parameter / scale, shape [n, p]."""
+        return self.slopes if self.model.unturned is self.model else self.model.turned(self.slopes.T).T
 
     @property
     def objective(self) -> float:
@@ -97,7 +108,7 @@ class Fit:
     @property
     def count(self) -> int:
         """Samples."""
-        return len(self.modes)
+        return len(self.rest)
 
     def prior_precision(self) -> Array:
         """(scale / std)^2 of each parameter, 0 where it is free, shape [p]."""
@@ -105,7 +116,7 @@ class Fit:
 
     def hessian(self) -> Array:
         """Of half the objective, in units of the parameters' scales, shape [p, p]."""
-        return self.jacobian.T @ self.jacobian + np.diag(self.prior_precision())
+        return self.slopes.T @ self.slopes + np.diag(self.prior_precision())
 
     def covariance(self, *, inflation: float = 1.0) -> Array:
         """Of the values, in their units, shape [p, p]; bounds are not seen, singular directions get wide.
@@ -113,7 +124,7 @@ class Fit:
         `inflation`: by how much the data are noisier than stated; the priors are not.
         """
         scales = np.array([p.scale for p in self.model.parameters])
-        hessian = self.jacobian.T @ self.jacobian / inflation**2 + np.diag(self.prior_precision())
+        hessian = self.slopes.T @ self.slopes / inflation**2 + np.diag(self.prior_precision())
         size = np.sqrt(np.maximum(np.diag(hessian), 1e-300))
         inverse = np.linalg.pinv(hessian / np.outer(size, size), rcond=1e-12, hermitian=True)
         return inverse / np.outer(size, size) * np.outer(scales, scales)
@@ -129,7 +140,7 @@ class Fit:
         scales = np.array([p.scale for p in parameters])
         pull = self.prior_precision() * np.array([self.values[p.name] - p.value for p in parameters]) / scales
         gradients = np.array([
-            self.jacobian[rows].T @ self.modes[rows] + pull * [p.trial == trial for p in parameters]
+            self.slopes[rows].T @ self.rest[rows] + pull * [p.trial == trial for p in parameters]
             for trial, rows in self.model.rows().items()
         ])  # fmt: skip
         bread = self.covariance() / scales
@@ -162,8 +173,7 @@ def fit(model: Model, start: Values | None = None, *, rounds: int = Rule.rounds)
 
 def fit_each(starts: Sequence[tuple[Model, Values | None]], *, rounds: int = Rule.rounds) -> list[Fit]:
     """`fit` of each model from its start, carried out together."""
-    rule = Rule(rounds=rounds)
-    return fits([(model, _begun(model, start), rule) for model, start in starts])
+    return fits([(model, _begun(model, start), Rule(rounds=rounds)) for model, start in starts])
 
 
 def fits(starts: Sequence[tuple[Model, Values, Rule]]) -> list[Fit]:
@@ -213,10 +223,10 @@ def _descent(model: Model, start: Values, rule: Rule) -> _Walk[Fit]:
     parameters = model.parameters
     scales = np.array([p.scale for p in parameters])
     low, high = np.array([p.lowest for p in parameters]), np.array([p.highest for p in parameters])
-    middle = np.array([p.value for p in parameters])
-    precision = np.array([p.std**-2 for p in parameters])
+    middle, precision = np.array([p.value for p in parameters]), np.array([p.std**-2 for p in parameters])
     x = np.clip(_numbers(parameters, start), low, high)
     names = [p.name for p in parameters]
+    unturned = model.unturned  # modes are needed at the end only: steps follow from their products
 
     def named(values: Array) -> dict[str, float]:
         return dict(zip(names, values.tolist(), strict=True))
@@ -225,10 +235,9 @@ def _descent(model: Model, start: Values, rule: Rule) -> _Walk[Fit]:
         return float((precision * (values - middle) ** 2).sum())
 
     best: Array | None = None
-    jacobian = np.zeros((0, len(x)))
-    free = np.ones(len(x), dtype=bool)
+    jacobian, free = np.zeros((0, len(x))), np.ones(len(x), dtype=bool)
     for number, share in enumerate(rule.shares):
-        part, whole, best = replace(model, share=share) if share < 1 else model, share >= 1, None
+        part, whole, best = replace(unturned, share=share) if share < 1 else unturned, share >= 1, None
         if number or rule.scan:
             x = _numbers(parameters, (yield from _scan(part, named(x)))[0])
         damping, scannable = rule.damping, True
@@ -252,7 +261,7 @@ def _descent(model: Model, start: Values, rule: Rule) -> _Walk[Fit]:
             place = int(np.argmin(objectives))
             gain = objective - objectives[place]
             if gain > 0:
-                x, best = trials[place], modes[place]
+                x, best = trials[place], modes[place].copy()  # the others of the batch are not kept
                 damping = max(damping * rule.tries[place].keep + rule.tries[place].then, rule.least)
             if gain >= (rule.enough + rule.relative * objective if whole else rule.early * objective):
                 continue
@@ -266,7 +275,7 @@ def _descent(model: Model, start: Values, rule: Rule) -> _Walk[Fit]:
                     continue
             break
     if best is None:
-        (best,) = yield model, [named(x)]
+        (best,) = yield unturned, [named(x)]
     return Fit(model, named(x), best, jacobian, float(best @ best), penalty(x), free)
 
 
@@ -275,7 +284,6 @@ def _step(
     at_bounds: tuple[NDArray[np.bool_], NDArray[np.bool_]], times: int,
 ) -> Array:  # fmt: skip
     """The damped step of the free parameters, found so many `times`, what runs into a bound at once left out."""
-    step = np.zeros(len(gradient))
     for _ in range(times):
         mine = hessian[np.ix_(free, free)]
         diagonal = np.diag(np.maximum(np.diag(mine), 1e-12))
@@ -391,8 +399,8 @@ class Linear:
 
 
 def settled(found: Fit) -> Fit:
-    """The same with its Jacobian taken over steps worth a standard deviation of the data (`settled_slopes`)."""
-    return replace(found, jacobian=settled_slopes(found.model, found.values)[1])
+    """The same with its slopes taken over steps worth a standard deviation of the data (`settled_slopes`)."""
+    return replace(found, slopes=settled_slopes(found.model.unturned, found.values)[1])
 
 
 def settled_slopes(model: Model, values: Values) -> tuple[Array, Array]:
@@ -480,8 +488,8 @@ def _slopes(model: Model, x: Array, known: Array | None = None) -> _Walk[tuple[A
             point[p.name] = x[k] + steps[k]
         points.append(point)
     modes = yield model, points
-    modes = modes if known is None else [known, *modes]
-    jacobian = np.zeros((len(modes[0]), len(parameters)))
+    modes = [modes[0].copy(), *modes[1:]] if known is None else [known, *modes]
+    jacobian = np.zeros((len(parameters), len(modes[0]))).T  # whose columns are filled one by one
     rows = model.rows()
     for place, members in enumerate(groups, 1):
         change = modes[place] - modes[0]

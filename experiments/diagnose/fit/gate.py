@@ -271,5 +271,10 @@ class _Shifted(Model):
 
     shift: Array | float = 0.0
 
+    @property
+    def unturned(self) -> Model:
+        """This one: its data are modes."""
+        return self
+
     def modes(self, residuals: Sequence[Mapping[str, Array]]) -> list[Array]:
         return [modes - self.shift for modes in super().modes(residuals)]

@@ -33,8 +33,9 @@ from experiments.check.words import Finding
 from rigid.terms.candidate import Bend, Number
 
 from .together import each
+from .trials import Planned, Samples, TrialInfo
 
-__all__ = ["Array", "Contacts", "Finding", "Form", "Model", "Parameter", "Problem", "Samples", "TrialInfo", "Values",
+__all__ = ["Array", "Contacts", "Finding", "Form", "Model", "Parameter", "Problem", "Values",
            "Whitener", "evaluate_all"]  # fmt: skip
 
 _MANY = 2**15  # residuals from which threads are worth their while
@@ -105,31 +106,6 @@ class Form:
         return {f"{self.effect}.{number.fitted}": number for number in self.numbers}
 
 
-@dataclass(frozen=True, kw_only=True)
-class TrialInfo:
-    """What the core must know of a trial."""
-
-    id: str
-    condition: tuple[object, ...]
-    """Trials of one condition are replicates. What is sorted next to one another is alike."""
-    settings: Mapping[str, float] = field(default_factory=dict)
-    """Numbers by which a person localises: ``torque_N_m``, ``gravity_m_s2``, ``speed_m_s``, ``diameter_m``."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Samples:
-    """The valid samples of a trial, in the order of its residuals; shapes [sample_count].
-
-    A channel's samples lie together and in the order of their times.
-    """
-
-    time: Array  # on the trial's clock [s]
-    channel: NDArray[np.str_]  # ``x y theta gyro ax ay wheel depth force accel``
-    std: Array
-    """Of the sensor as campaign.toml states it, in the channel's unit (of a driven force at the base model's fit,
-    the smoothed depth's error included)."""
-
-
 class Contacts(Protocol):
     """A search of its own for where fits begin: of trials that touch, slip and fall, whose likelihood jumps."""
 
@@ -162,19 +138,6 @@ class Estimate(Protocol):
 
     def covariance(self, *, inflation: float = 1.0) -> Array:
         """Of the numbers, in their units, shape [p, p]; `inflation`: by how much the data are noisier than stated."""
-
-
-@dataclass(frozen=True)
-class Planned:
-    """A trial that was not made, and how well it would separate two models."""
-
-    settings: Mapping[str, float]  # name with its unit -> value
-    what: str  # the trial in words
-    nats: float  # evidence to be expected
-    tried: int  # trials of the search
-    apart: Mapping[str, float] | None = None
-    """Where the two predictions differ most over their errors: ``depth_m``, ``speed_m_s`` (negative on the way back),
-    ``one_N`` and ``other_N`` with ``one_std_N`` and ``other_std_N``."""
 
 
 class Problem(Protocol):
@@ -377,10 +340,30 @@ class Whitener:
         """Modes of the residuals of a trial, shape [sample_count], or [point_count, sample_count]."""
         if trial in self.kept:
             residuals = residuals * self.kept[trial]
+        return self.turned(trial, residuals) * self.weights[trial]
+
+    def turned(self, trial: str, residuals: Array) -> Array:
+        """Residuals of a trial by mode, not weighed; shapes as of `modes`."""
         if not self.blocks:
             return residuals
+        if len(self.blocks[trial]) == 1:  # whose rows are those of the trial, in their order
+            return dct(residuals, norm="ortho", axis=-1)
         parts = [dct(np.take(residuals, rows, axis=-1), norm="ortho", axis=-1) for rows in self.blocks[trial]]
-        return np.concatenate(parts, axis=-1) * self.weights[trial]
+        return np.concatenate(parts, axis=-1)
+
+    @cached_property
+    def unturned(self) -> Whitener:
+        """One that turns nothing, where each channel of a trial is weighed by one number: products of modes over a
+        trial are then those of residuals so weighed. Else this one."""
+        weights = {}
+        for trial, blocks in self.blocks.items():
+            weights[trial], start = np.ones(len(self.weights[trial])), 0
+            for rows in blocks:
+                own = self.weights[trial][start : (start := start + len(rows))]
+                if np.ptp(own) > 0:
+                    return self
+                weights[trial][rows] = own
+        return replace(self, blocks={}, weights=weights) if weights else self
 
     def channel_blocks(self, problem: Problem, trial: str) -> list[tuple[str, slice]]:
         """Each channel of a trial, and where its modes stand."""
@@ -451,12 +434,31 @@ class Model:
     def modes(self, residuals: Sequence[Mapping[str, Array]]) -> list[Array]:
         """The same of residuals by trial, as the problem has them at each point."""
 
+        if not self.whitener.blocks:
+            found = np.empty((len(residuals), sum(len(self.whitener.weights[id]) for id in self.trials)))
+            for trial, rows in self.rows().items():
+                found[:, rows] = self.whitener.modes(trial, np.stack([one[trial] for one in residuals]))
+            return list(found)
+
         def modes(trial: str) -> Array:
             return self.whitener.modes(trial, np.stack([one[trial] for one in residuals]))
 
         many = len(residuals) * sum(len(self.whitener.weights[id]) for id in self.trials) >= _MANY
         parts = each(modes, self.trials, threads=None if many else 1)
-        return [np.concatenate([part[k] for part in parts]) for k in range(len(residuals))]
+        return list(np.concatenate(parts, axis=1))
+
+    @property
+    def unturned(self) -> Model:
+        """The same with residuals for modes, where products of them are the same (`Whitener.unturned`); else this one.
+        A search of contacts counts modes: it needs them."""
+        if self.problem.contacts is not None or self.whitener.unturned is self.whitener:
+            return self
+        return replace(self, whitener=self.whitener.unturned)
+
+    def turned(self, unturned: Array) -> Array:
+        """Modes, from what `unturned` has for them; shape [n] or [count, n]."""
+        parts = [self.whitener.turned(trial, unturned[..., rows]) for trial, rows in self.rows().items()]
+        return np.concatenate(parts, axis=-1)
 
     def rows(self) -> dict[str, slice]:
         """Where each trial's modes stand."""
@@ -483,5 +485,15 @@ def evaluate_all(asked: Sequence[tuple[Model, Sequence[Values]]]) -> list[list[A
             for one, own in zip(models, points, strict=True)
         ]
         residuals = models[0].problem.evaluate_together(whole, trials, share)
-        found |= {k: model.modes(own) for k, model, own in zip(mine, models, residuals, strict=True)}
+        for like in _turned_alike(models):
+            modes = iter(models[like[0]].modes([one for k in like for one in residuals[k]]))
+            found |= {mine[k]: [next(modes) for _ in residuals[k]] for k in like}
     return [found[k] for k in range(len(asked))]
+
+
+def _turned_alike(models: Sequence[Model]) -> list[list[int]]:
+    """The places of models whose modes are the same ones of a residual; alone where a model has modes of its own."""
+    alike: dict[tuple[int, int], list[int]] = {}
+    for k, model in enumerate(models):
+        alike.setdefault((id(model.whitener), -1 if type(model) is Model else k), []).append(k)
+    return list(alike.values())

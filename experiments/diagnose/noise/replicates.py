@@ -15,7 +15,8 @@ from experiments.diagnose.fit.evidence import inflation, slow_count
 from experiments.diagnose.fit.fitting import Fit, Model, fit, scanned
 from experiments.diagnose.fit.gaps import size_words
 from experiments.diagnose.fit.gate import low_modes
-from experiments.diagnose.fit.problem import Array, Finding, Parameter, TrialInfo, Values
+from experiments.diagnose.fit.problem import Array, Finding, Parameter, Values
+from experiments.diagnose.fit.trials import TrialInfo
 
 __all__ = ["Scatter", "deviations", "exchanged", "find_scatter", "groups_of", "has_replicates", "likeliest_scatter",
            "odd_trials", "order_chance", "parted", "split_trials", "trends", "with_scatter"]  # fmt: skip

@@ -1,17 +1,19 @@
 """What may differ from push to push beyond the sensors: strength, damping and way back of the bed, and the zeros."""
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 
 import numpy as np
 
 from experiments.campaign import PenetrationCampaign
-from experiments.diagnose.fit.problem import Form, Parameter, Values
+from experiments.diagnose.fit.problem import Array, Form, Parameter, Values
 
 from .data import Prepared, stds
 from .forms import Scales
 from .parameters import comes_back, diameters_of, named
 
-__all__ = ["centred", "scatter_parameters"]
+__all__ = ["OWN", "centred", "own_numbers", "scatter_parameters"]
+
+OWN = ("bed", "bed damping", "bed unloading", "depth zero")  # numbers of a push alone that its force follows from
 
 _ZERO_DEPTH = 0.1  # how far a depth's zero may differ between pushes while it is asked whether it does, over D
 _LEAST_ZERO = 0.2  # zeros that differ by less than this share of the noise are negligible
@@ -61,4 +63,14 @@ def centred(values: Values, trials: Sequence[Prepared], forms: Sequence[Form]) -
             mean = float(np.mean([values[name] for name in own]))
             found[shared] = (found[shared] + more) * (1 + mean) - more
             found |= {name: (1 + values[name]) / (1 + mean) - 1 for name in own}
+    return found
+
+
+def own_numbers(points: Sequence[Values], kind: str, trials: Sequence[Prepared], given: Container[str]) -> Array:
+    """A number of each trial's own at each point, 0 where there is none, shape [trials, points]. `given`: the names
+    that some point has."""
+    found = np.zeros((len(trials), len(points)))
+    for own, name in zip(found, (f"{kind}[{trial.info.id}]" for trial in trials), strict=True):
+        if name in given:
+            own[:] = [values.get(name, 0.0) for values in points]
     return found

@@ -1,5 +1,6 @@
 """Trials of penetration made ready for fits: gaps left out, faults found and set aside, depth smoothed."""
 
+import hashlib
 import math
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
@@ -13,7 +14,8 @@ from scipy.stats import norm
 from experiments.campaign import Campaign, PenetrationCampaign, Recording
 from experiments.campaign.tables import PenetrationTrial, SpikeTable
 from experiments.check.replicas import pace_of
-from experiments.diagnose.fit.problem import Array, Finding, TrialInfo
+from experiments.diagnose.fit.problem import Array, Finding
+from experiments.diagnose.fit.trials import TrialInfo
 from experiments.diagnose.noise.colour import Colour, colour_of, together
 from experiments.diagnose.noise.replicates import parted
 from experiments.diagnose.noise.stuck import clipped, cut_rows, stuck_rows
@@ -67,10 +69,28 @@ class Prepared:
 
 
 def prepare(campaign: Campaign) -> tuple[list[Prepared], list[Finding]]:
-    """The trials that can be used, and what was wrong with the data.
+    """The trials that can be used, and what was wrong with the data. The last campaign's are kept: a command checks a
+    campaign before it diagnoses it, and smoothing takes long.
 
     Raises ValueError where no trial is left, or a sensor that is scored has no noise.
     """
+    digest = hashlib.sha256(repr(campaign.tables).encode())
+    for of, recording in campaign.recordings.items():
+        for name, column in recording.columns.items():
+            digest.update(repr((of, name)).encode() + column.tobytes())
+    if (key := digest.digest()) not in _KEPT:
+        found = _prepared(campaign)
+        _KEPT.clear()
+        _KEPT[key] = found
+    trials, findings = _KEPT[key]
+    return list(trials), list(findings)
+
+
+_KEPT: dict[bytes, tuple[list[Prepared], list[Finding]]] = {}  # by the digest of the campaign
+
+
+def _prepared(campaign: Campaign) -> tuple[list[Prepared], list[Finding]]:
+    """The same, made anew."""
     tables = campaign.tables
     assert isinstance(tables, PenetrationCampaign)
     recordings = {table.id: campaign.recordings[table.id, "data"] for table in tables.trial}

@@ -7,6 +7,7 @@ The fit is linear, or all but so, and its error a known linear map of the noise.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.interpolate import BSpline
@@ -47,6 +48,11 @@ class SmoothDepth:
     def holds(self) -> Holds:
         """Which of its levels of speed are 0; () where it is no motion of levels."""
         return () if self.drive is None else self.drive.resting
+
+    @cached_property
+    def slow(self) -> float:
+        """Speed below which the direction of the motion is not certain [m/s]."""
+        return max(0.02 * float(np.abs(self.speed).max()), 2 * float(np.median(self.speed_std)), 1e-12)
 
     @property
     def depth_std(self) -> Array:

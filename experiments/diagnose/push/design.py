@@ -12,7 +12,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from experiments.diagnose.fit.problem import Array, Estimate, Form, Planned, Values
+from experiments.diagnose.fit.problem import Array, Estimate, Form, Values
+from experiments.diagnose.fit.trials import Planned
 
 __all__ = ["best_push"]
 

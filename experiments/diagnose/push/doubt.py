@@ -1,7 +1,5 @@
 """What the error of a smoothed depth leaves in doubt of a driven trial's force: at the surface, and where it turns."""
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,7 +9,7 @@ from experiments.grains.spells import spells
 from .data import Prepared
 from .depth import SmoothDepth
 
-__all__ = ["bounded", "off_rest", "off_surface", "path_error", "reversing", "touching", "turning"]
+__all__ = ["bounded", "jumping", "off_rest", "off_surface", "path_error", "reversing", "touching", "turning"]
 
 _BESIDE = 5  # rows before and after a turn that show the force there
 _AT_TURN = 6
@@ -22,8 +20,9 @@ _FAILED = 1e3  # residual over the noise where a model is no number
 
 def bounded(rest: Array) -> Array:
     """Residuals over the noise that a sum of squares can hold."""
-    near = np.clip(rest, -1e5, 1e5)
-    return near if math.isfinite(float(rest.sum())) else np.where(np.isfinite(rest), near, _FAILED)
+    if np.abs(rest).max(initial=0.0) <= 1e5:  # false of what is no number
+        return rest
+    return np.where(np.isfinite(rest), np.clip(rest, -1e5, 1e5), _FAILED)
 
 
 def path_error(smooth: SmoothDepth, by_depth: Array, by_row: Array) -> Array:
@@ -67,6 +66,20 @@ def reversing(trial: Prepared) -> NDArray[np.bool_]:
     for k in np.flatnonzero(speed[1:] * speed[:-1] < 0):  # between two rows, neither of which is in doubt
         found[k + int(abs(speed[k + 1]) < abs(speed[k]))] = True
     return found
+
+
+def jumping(trial: Prepared, by_depth: Array, by_speed: Array, shallow: float) -> Array:
+    """By how much the force is in doubt where its error may cross the surface or the turning point, as a variance [N2],
+    shape [n]: there it is no linear function of the depth's. `shallow`: depth [m] up to which a tip counts as just
+    below the surface."""
+    smooth = trial.path
+    bend = np.abs(by_speed).max() * smooth.speed_std * (np.abs(smooth.speed) < 3 * smooth.speed_std)
+    jump = float(np.abs(by_speed).max() * np.abs(smooth.speed).max())
+    # An effect may begin with a jump at the surface: as large as the force is measured to be just below it.
+    here = (smooth.depth > 0) & (smooth.depth < np.maximum(8 * smooth.depth_std, shallow)) & trial.has_other
+    below = float(np.median(np.abs(trial.other[here]))) if here.any() else 0.0
+    start = max(jump, below) + np.abs(by_depth).max() * smooth.depth_std
+    return bend**2 + (start * touching(trial)) ** 2
 
 
 def turning(speed: Array, std: Array, force: Array, noise: float) -> tuple[Array, Array]:

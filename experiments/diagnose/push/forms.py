@@ -5,12 +5,13 @@ one scale serves grains and clay. Where trials have several diameters d, forces 
 a shaft to d. Those of the bed's spring are proportional to that diameter's own K. This connects the diameters.
 """
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from experiments.diagnose.fit.forms import OwnEffect, plain_form
-from experiments.diagnose.fit.problem import Form
+from experiments.diagnose.fit.problem import Array, Form
 from rigid.terms import CANDIDATES
 from rigid.terms.candidate import Number, Push
 
@@ -50,8 +51,11 @@ def _of_term(own: OwnEffect) -> Form:
     return replace(form, numbers=tuple(replace(n, name=f"{own.id}.{n.name}") for n in form.numbers))
 
 
-def physical(slot: Number, value: float, scales: Scales, *, stiffness: float, size: float) -> float:
-    """What the law's slot gets: `stiffness` [N/m] is this diameter's K, `size` its diameter over the campaign's.
+def physical(
+    slot: Number, value: float | Array, scales: Scales, *, stiffness: float | Array, size: float | Array
+) -> float | Array:  # fmt: skip
+    """What the law's slot gets: `stiffness` [N/m] is this diameter's K, `size` its diameter over the campaign's; of
+    arrays that go together an array.
 
     How it follows from the value (`Number.how`): ``plain``, ``depth`` (D e^value), ``speed`` (V e^value), ``time``
     (e^value s), ``spring`` (K, of this diameter) and ``spring force`` (K D, of this diameter). By the diameter change
@@ -63,20 +67,20 @@ def physical(slot: Number, value: float, scales: Scales, *, stiffness: float, si
     if slot.how == "change":
         return value + slot.typical
     if slot.how == "depth":
-        return scales.depth * math.exp(value)
+        return scales.depth * np.exp(value)
     if slot.how == "time":
-        return math.exp(value)
+        return np.exp(value)
     if slot.how == "speed":
-        return scales.speed * math.exp(value)
+        return scales.speed * np.exp(value)
     if slot.how == "spring":
         return value * stiffness
     if slot.how == "spring force":
         return value * stiffness * scales.depth
     factor = size if slot.how in ("perimeter", "viscous") else size**2
     if slot.how == "drag":
-        factor /= scales.speed**2
+        factor = factor / scales.speed**2
     elif slot.how == "viscous":
-        factor /= scales.speed
+        factor = factor / scales.speed
     return value * scales.force * factor
 
 

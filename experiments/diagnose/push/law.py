@@ -29,77 +29,25 @@ from numpy.typing import NDArray
 from experiments.diagnose.fit.forms import OwnEffect
 from rigid.batch.runtime import ensure
 from rigid.model.model import for_taichi
-from rigid.terms import CANDIDATES, FIXED_ARGUMENTS, STATE_FIELDS, Term
+from rigid.terms import FIXED_ARGUMENTS, STATE_FIELDS, Term
 from rigid.terms.candidate import Push
 
-__all__ = ["PHASES", "SLOTS", "fall", "given_way", "push", "slot_places", "slot_table"]
+from .slots import HERE, LIBRARY, PLACES, SLOTS, VALUES, slots_of
 
-_HERE = ("z", "v", "x", "way", "share", "most", "ever", "reference", "radius_depth")
-_VALUES: Mapping[str, tuple[str, ...]] = {
-    "loading": ("grown", "depth", "x"), "unload": ("at", "stiff", "bent", "z", "ever", "stiffness"),
-    "damper": ("factor", "spring"), "settle": ("gone", "z", "span"), "mass": ("z", "x", "reference"),
-    "force": ("total", *_HERE), "pull": ("total", *_HERE),
-}  # fmt: skip
-"""What each hook of `Push.law` may ask for beside its effect's slots."""
+__all__ = ["PHASES", "fall", "given_way", "push", "push_each"]
 
-
-def _slots_of(law: Push) -> tuple[str, ...]:
-    """Numbers of one trial that an effect's hooks ask for, in their order."""
-    asked = [name for hook, function in law.law.items() for name in inspect.signature(function).parameters
-             if name not in _VALUES[hook]]  # fmt: skip
-    return tuple(dict.fromkeys((*asked, *(law.turning or ()))))
-
-
-_LIBRARY = tuple(
-    push for _, _, push in sorted((c.push.rank, id, c.push) for id, c in CANDIDATES.items() if c.push is not None)
-)
-SLOTS = (
-    "mass", "gravity", "stiffness", "damping", "reference", "speed_scale", "radius_depth",
-    *(slot for effect in _LIBRARY for slot in _slots_of(effect)), "shift_depth", "shift_row", "shift_speed",
-    "given_way", "unload_change",
-)  # fmt: skip
-"""Numbers of a lane, in order. `radius_depth`: depth at which the tip is wholly in; `speed_scale`: below it the
-direction of a driven spike is not certain; shifts: added to a driven spike's path, for derivatives (`shift_row`: to the
-depth of each row alone, with its history unchanged); `given_way`: permanent sinkage of the bed before the push [m];
-`unload_change`: of K where the way back has a stiffness of its own, relative."""
 PHASES = ("free", "in", "rest", "out")
 
-_SLOT = {name: place for place, name in enumerate(SLOTS)}
-_NEVER_ZERO = {"reference": 0.01, "speed_scale": 1e-4, "radius_depth": 1e-4}
-_HELD, _REACH = next(effect.turning for effect in _LIBRARY if effect.turning is not None)
+_HELD, _REACH = next(effect.turning for effect in LIBRARY if effect.turning is not None)
 _STEP, _TURN = 1.25e-3, 0.1
 """Longest step of a drop [s], and over sqrt(m / K), which is tens of ms for a spike on sand. With these what is off
 stays below 0.004 of the sensors' noise for every form of the library."""
-_STEEP, _RISE = next(effect.steep for effect in _LIBRARY if effect.steep is not None)
+_STEEP, _RISE = next(effect.steep for effect in LIBRARY if effect.steep is not None)
 _SHORTEST = 2e-6
 """Shortest step of a drop for a friction that rises with speed [s]."""
 
 _SETTLED = 1e-3
 """Speed [m/s] at which a spike that comes back to a surface that supports it stays there: it would hop by 5e-8 m."""
-
-
-def slot_places(own: Sequence[OwnEffect] = ()) -> dict[str, int]:
-    """Slot -> its place in a lane; those of effects from files stand behind `SLOTS`, in order."""
-    names = [name for effect in own for name, _ in _own_slots(effect)]
-    return _SLOT | {name: len(SLOTS) + place for place, name in enumerate(names)}
-
-
-def _own_slots(effect: OwnEffect) -> list[tuple[str, float]]:
-    """Numbers of an effect from a file: slot, and its value where the effect is off."""
-    if effect.push is not None:
-        return [(slot, effect.push.lengths.get(slot, 0.0)) for slot in _slots_of(effect.push)]
-    return [(f"{effect.id}.{p.name}", effect.neutral(p.name)) for p in effect.term.parameters]
-
-
-def slot_table(count: int, own: Sequence[OwnEffect] = ()) -> NDArray[np.float64]:
-    """Numbers of `count` lanes, shape [count, slot_count] (`slot_places`): nothing acts, and no length is zero."""
-    off = [value for effect in own for _, value in _own_slots(effect)]
-    table = np.zeros((count, len(SLOTS) + len(off)))
-    table[:, len(SLOTS) :] = off
-    lengths = [effect.lengths for effect in _LIBRARY]
-    for name, value in [pair for given in (_NEVER_ZERO, *lengths) for pair in given.items()]:
-        table[:, _SLOT[name]] = value
-    return table
 
 
 def push(numbers: NDArray[np.float64], lane_path: NDArray[np.int32], starts: NDArray[np.int32],
@@ -112,13 +60,47 @@ def push(numbers: NDArray[np.float64], lane_path: NDArray[np.int32], starts: NDA
     after another. `own`: effects from files, whose parameters `numbers` holds. `times`: of the paths [s]; without
     them no time passes, so that nothing gives way.
     """
-    ensure()
     longest = int(np.diff(starts).max())
     out = np.zeros((len(numbers), longest))
+    begins = longest * np.arange(len(numbers))
+    _push(numbers, lane_path, starts, depth, speed, own, times, begins, out.reshape(-1))
+    return out
+
+
+def push_each(
+    numbers: NDArray[np.float64], starts: NDArray[np.int32], depth: NDArray[np.float64], speed: NDArray[np.float64],
+    own: tuple[OwnEffect, ...], times: NDArray[np.float64],
+) -> list[NDArray[np.float64]]:  # fmt: skip
+    """The same of as many lanes on each path, those of the first path first: of each path forces [N], shape [lane_count
+    of the path, its rows]."""
+    paths = len(starts) - 1
+    count, lengths = len(numbers) // paths, np.diff(starts)
+    out = np.empty(count * int(starts[-1]))
+    begins = np.repeat(count * starts[:-1].astype(np.int64), count) + np.tile(np.arange(count), paths) * np.repeat(
+        lengths, count
+    )
+    lane_path = np.repeat(np.arange(paths, dtype=np.int32), count)
+    _push(numbers, lane_path, starts, depth, speed, own, times, begins, out)
+    edges = count * starts.astype(np.int64)
+    return [out[edges[p] : edges[p + 1]].reshape(count, -1) for p in range(paths)]
+
+
+def _push(
+    numbers: NDArray[np.float64], lane_path: NDArray[np.int32], starts: NDArray[np.int32], depth: NDArray[np.float64],
+    speed: NDArray[np.float64], own: tuple[OwnEffect, ...], times: NDArray[np.float64] | None,
+    begins: NDArray[np.int64], out: NDArray[np.float64],
+) -> None:  # fmt: skip
+    """Put the forces of a lane into `out` from its place in `begins` on."""
+    ensure()
     kernel = _kernels(tuple((effect.term, effect.push) for effect in own))[0]
     times = np.zeros(len(depth)) if times is None else times
-    kernel(np.ascontiguousarray(numbers), lane_path.astype(np.int32), starts.astype(np.int32), times, depth, speed, out)
-    return out
+    followed, first = np.unique(lane_path, return_index=True)
+    like = np.zeros(len(starts) - 1, dtype=np.int32)
+    like[followed] = first
+    scale, shift = (np.repeat(numbers[like, PLACES[name]], np.diff(starts)) for name in ("speed_scale", "shift_speed"))
+    ways = np.tanh((speed + shift) / scale)
+    lanes = (np.ascontiguousarray(numbers), lane_path.astype(np.int32), starts.astype(np.int32), like, begins)
+    kernel(*lanes, times, depth, speed, ways, out)
 
 
 def fall(numbers: NDArray[np.float64], lane_path: NDArray[np.int32], starts: NDArray[np.int32],
@@ -133,9 +115,9 @@ def fall(numbers: NDArray[np.float64], lane_path: NDArray[np.int32], starts: NDA
     ensure()
     longest = int(np.diff(starts).max())
     out = np.zeros((len(numbers), longest, 4))
-    held = np.abs(numbers[:, _SLOT[_HELD]]) / numbers[:, _SLOT[_REACH]]
-    rate = np.sqrt((np.maximum(numbers[:, _SLOT["stiffness"]], 1e-9) + held) / numbers[:, _SLOT["mass"]])
-    rate += np.abs(numbers[:, _SLOT["damping"]]) / numbers[:, _SLOT["mass"]]
+    held = np.abs(numbers[:, PLACES[_HELD]]) / numbers[:, PLACES[_REACH]]
+    rate = np.sqrt((np.maximum(numbers[:, PLACES["stiffness"]], 1e-9) + held) / numbers[:, PLACES["mass"]])
+    rate += np.abs(numbers[:, PLACES["damping"]]) / numbers[:, PLACES["mass"]]
     steps = np.minimum(_STEP, _TURN / rate)
     numbers, steep = _risen(numbers)
     steps = np.minimum(steps, steep)
@@ -152,15 +134,15 @@ def _risen(numbers: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[n
     of 2.8 of these times; it takes steps of one. Where that is shorter than `_SHORTEST`, w is as large as it resolves:
     there the friction is all but a constant one.
     """
-    bound = np.abs(numbers[:, [_SLOT[name] for name in _STEEP]]).sum(axis=1)
-    speed = numbers[:, _SLOT[_RISE]]
+    bound = np.abs(numbers[:, [PLACES[name] for name in _STEEP]]).sum(axis=1)
+    speed = numbers[:, PLACES[_RISE]]
     steep = (bound > 0.0) & (speed > 0.0)
     if not steep.any():
         return numbers, np.full(len(numbers), np.inf)
-    slowing = bound / numbers[:, _SLOT["mass"]]  # [m/s2]
+    slowing = bound / numbers[:, PLACES["mass"]]  # [m/s2]
     risen = numbers.copy()
-    risen[steep, _SLOT[_RISE]] = np.maximum(speed, slowing * _SHORTEST)[steep]
-    own = np.divide(risen[:, _SLOT[_RISE]], slowing, out=np.full(len(numbers), np.inf), where=steep)
+    risen[steep, PLACES[_RISE]] = np.maximum(speed, slowing * _SHORTEST)[steep]
+    own = np.divide(risen[:, PLACES[_RISE]], slowing, out=np.full(len(numbers), np.inf), where=steep)
     return risen, own
 
 
@@ -172,9 +154,9 @@ def _parts(own: _Own) -> list[tuple[Mapping[str, Callable[..., Any]], Mapping[st
     """Hooks of every effect, the library's first, and the places in a lane of the numbers that they ask for."""
     at = len(SLOTS)
     parts: list[tuple[Mapping[str, Callable[..., Any]], Mapping[str, int]]]
-    parts = [(effect.law, _SLOT) for effect in _LIBRARY]
+    parts = [(effect.law, PLACES) for effect in LIBRARY]
     for term, law in own:
-        names = tuple(p.name for p in term.parameters) if law is None else _slots_of(law)
+        names = tuple(p.name for p in term.parameters) if law is None else slots_of(law)
         functions = term.hooks if law is None else law.law
         parts.append((functions, {name: at + place for place, name in enumerate(names)}))
         at += len(names)
@@ -191,7 +173,7 @@ def given_way(lane: NDArray[np.float64], gone: NDArray[np.float64] | None, depth
     after = np.zeros(len(law)) if gone is None else np.array(gone)
     for k, share in _turns(len(law)):
         hook, columns = law[k][0]["settle"], law[k][1]
-        asked = list(inspect.signature(hook).parameters)[len(_VALUES["settle"]) :]
+        asked = list(inspect.signature(hook).parameters)[len(VALUES["settle"]) :]
         others = float(after.sum() - after[k])
         after[k] = hook(float(after[k]), depth - others, share * span, *(float(lane[columns[name]]) for name in asked))
     return after
@@ -229,7 +211,7 @@ def _changes(own: _Own) -> tuple[int, list[Any]]:
     what the terms of effects from files make of the spring's force, and the force that they add. Before them: how many
     effects make the bed give way."""
     hooks: dict[str, Callable[..., Any]] = {}
-    calls: dict[str, list[str]] = {name: [] for name in (*_VALUES, "own_spring", "own_force")}
+    calls: dict[str, list[str]] = {name: [] for name in (*VALUES, "own_spring", "own_force")}
     settling: list[tuple[str, str]] = []
     for place, (functions, columns) in enumerate(_parts(own)):
         for hook, function in functions.items():
@@ -237,18 +219,18 @@ def _changes(own: _Own) -> tuple[int, list[Any]]:
             hooks[called] = function
             if hook in _TERM_LINES:
                 where, lines = _TERM_LINES[hook]
-                numbers = "".join(f", n[k, {columns[name]}]" for name in asked[len(FIXED_ARGUMENTS[hook]) :])
+                numbers = "".join(f", n[{columns[name]}]" for name in asked[len(FIXED_ARGUMENTS[hook]) :])
                 calls[where] += [line.format(called, numbers) for line in lines]
             elif hook == "settle":
-                settling.append((called, "".join(f", n[k, {columns[name]}]" for name in asked[len(_VALUES[hook]) :])))
+                settling.append((called, "".join(f", n[{columns[name]}]" for name in asked[len(VALUES[hook]) :])))
             else:
-                arguments = (name if name in _VALUES[hook] else f"n[k, {columns[name]}]" for name in asked)
+                arguments = (name if name in VALUES[hook] else f"n[{columns[name]}]" for name in asked)
                 calls[hook].append(f"{called}({', '.join(arguments)})")
     for at, share in _turns(len(settling)):
         called, numbers = settling[at]
         others = f"z - (gone.sum() - gone[{at}])"
         calls["settle"].append(f"gone[{at}] = {called}(gone[{at}], {others}, {share} * span{numbers})")
-    n = "n: ti.template(), k"
+    n = "n: ti.template()"
     return len(settling), _compiled({
         f"loading_changed(before, depth, x, {n})":
             ["grown = before", *(f"grown = {call}" for call in calls["loading"]), "return grown"],
@@ -261,7 +243,7 @@ def _changes(own: _Own) -> tuple[int, list[Any]]:
             ["gone = before", *calls["settle"], "return gone"],
         f"mass_changed(z, x, reference, {n})":
             ["total = 0.0", *(f"total = total + {call}" for call in calls["mass"]), "return total"],
-        f"force_changed(before, {', '.join(_HERE)}, {n})":
+        f"force_changed(before, {', '.join(HERE)}, {n})":
             ["total = before", *(f"total = total + {call}" for call in calls["force"]),
              *(f"total = total - {call}" for call in calls["pull"]), "return total"],
         f"own_spring(s, z, spring, {n})": ["force = spring", *calls["own_spring"], "return force"],
@@ -280,52 +262,52 @@ def _functions(own: _Own) -> tuple[int, Any, Any, Any, Any]:
         loading_changed, unload_changed, damper_changed, settled, mass_changed, force_changed, own_spring, own_force,
     ) = _changes(own)  # fmt: skip
     OWN = any(law is None for _, law in own)
-    MASS, GRAVITY, STIFFNESS, DAMPING = (_SLOT[name] for name in ("mass", "gravity", "stiffness", "damping"))
-    UNLOAD_CHANGE = _SLOT["unload_change"]
-    REFERENCE, RADIUS_DEPTH, HELD, REACH = (_SLOT[name] for name in ("reference", "radius_depth", _HELD, _REACH))
+    MASS, GRAVITY, STIFFNESS, DAMPING = (PLACES[name] for name in ("mass", "gravity", "stiffness", "damping"))
+    UNLOAD_CHANGE = PLACES["unload_change"]
+    REFERENCE, RADIUS_DEPTH, HELD, REACH = (PLACES[name] for name in ("reference", "radius_depth", _HELD, _REACH))
 
     @ti.func
-    def loading(z: ti.f64, n: ti.template(), k: ti.i32) -> ti.f64:
+    def loading(z: ti.f64, n: ti.template()) -> ti.f64:
         depth = ti.max(z, 0.0)
-        grown = loading_changed(n[k, STIFFNESS] * depth, depth, depth / n[k, REFERENCE], n, k)
+        grown = loading_changed(n[STIFFNESS] * depth, depth, depth / n[REFERENCE], n)
         return grown if depth > 0.0 else 0.0
 
     @ti.func
-    def taken(z: ti.f64, way: ti.f64, turn_z: ti.f64, turn_w: ti.f64, n: ti.template(), k: ti.i32) -> ti.f64:
+    def taken(z: ti.f64, way: ti.f64, turn_z: ti.f64, turn_w: ti.f64, n: ti.template()) -> ti.f64:
         """Share of the friction's bound at z, from `turn_w` at `turn_z` on, where the way last turned."""
-        return way + (turn_w - way) * ti.exp(-ti.abs(z - turn_z) / n[k, REACH])
+        return way + (turn_w - way) * ti.exp(-ti.abs(z - turn_z) / n[REACH])
 
     @ti.func
     def force(
         z: ti.f64, v: ti.f64, way: ti.f64, top: ti.f64, deepest: ti.f64, turn_z: ti.f64, turn_w: ti.f64,
-        gone: ti.f64, n: ti.template(), k: ti.i32,
+        gone: ti.f64, n: ti.template(),
     ) -> ti.f64:  # fmt: skip
         total = 0.0
         if z > 0.0:
             most, ever = ti.max(top, z), ti.max(deepest, z)
             # Where the loading curve is read, what is taken off it, and by how much it bends.
-            at, stiff, bent = unload_changed(z, ever, n[k, STIFFNESS] * (1.0 + n[k, UNLOAD_CHANGE]), n, k)
-            spring = ti.max(loading(at - gone, n, k) * bent - stiff, 0.0)
+            at, stiff, bent = unload_changed(z, ever, n[STIFFNESS] * (1.0 + n[UNLOAD_CHANGE]), n)
+            spring = ti.max(loading(at - gone, n) * bent - stiff, 0.0)
             if ti.static(OWN):
-                s = State(mass=n[k, MASS], gravity=n[k, GRAVITY], weight=n[k, MASS] * n[k, GRAVITY], y=-z, vy=-v)
-                spring = own_spring(s, z, spring, n, k)
+                s = State(mass=n[MASS], gravity=n[GRAVITY], weight=n[MASS] * n[GRAVITY], y=-z, vy=-v)
+                spring = own_spring(s, z, spring, n)
             total = spring
-            total += n[k, DAMPING] * ti.max(v, 0.0) * damper_changed(spring, n, k)
+            total += n[DAMPING] * ti.max(v, 0.0) * damper_changed(spring, n)
             share = 0.0
-            if n[k, HELD] != 0.0:
-                share = taken(z, way, turn_z, turn_w, n, k)
-            reference, radius_depth = n[k, REFERENCE], n[k, RADIUS_DEPTH]
-            total = force_changed(total, z, v, z / reference, way, share, most, ever, reference, radius_depth, n, k)
+            if n[HELD] != 0.0:
+                share = taken(z, way, turn_z, turn_w, n)
+            reference, radius_depth = n[REFERENCE], n[RADIUS_DEPTH]
+            total = force_changed(total, z, v, z / reference, way, share, most, ever, reference, radius_depth, n)
             if ti.static(OWN):
-                s = State(mass=n[k, MASS], gravity=n[k, GRAVITY], weight=n[k, MASS] * n[k, GRAVITY], y=-z, vy=-v)
-                total += own_force(s, z, v, most, n, k)
+                s = State(mass=n[MASS], gravity=n[GRAVITY], weight=n[MASS] * n[GRAVITY], y=-z, vy=-v)
+                total += own_force(s, z, v, most, n)
         return total
 
     @ti.func
-    def carried(z: ti.f64, way: ti.f64, n: ti.template(), k: ti.i32) -> ti.f64:
+    def carried(z: ti.f64, way: ti.f64, n: ti.template()) -> ti.f64:
         more = 0.0
         if way > 0.0:
-            more = mass_changed(z, z / n[k, REFERENCE], n[k, REFERENCE], n, k) / n[k, MASS]
+            more = mass_changed(z, z / n[REFERENCE], n[REFERENCE], n) / n[MASS]
         return more
 
     return settling, force, taken, settled, carried
@@ -336,45 +318,55 @@ def _kernels(own: _Own) -> tuple[Any, Any]:
     from hedgebed_taichi import ti
 
     settling, force, taken, settled, carried = _functions(own)
-    GIVEN_WAY = _SLOT["given_way"]
-    MASS, GRAVITY, SPEED_SCALE, SETTLED = _SLOT["mass"], _SLOT["gravity"], _SLOT["speed_scale"], _SETTLED
-    SHIFT_DEPTH, SHIFT_ROW, SHIFT_SPEED = (_SLOT[name] for name in ("shift_depth", "shift_row", "shift_speed"))
+    GIVEN_WAY, HELD = PLACES["given_way"], PLACES[_HELD]
+    MASS, GRAVITY, SPEED_SCALE, SETTLED = PLACES["mass"], PLACES["gravity"], PLACES["speed_scale"], _SETTLED
+    SHIFT_DEPTH, SHIFT_ROW, SHIFT_SPEED = (PLACES[name] for name in ("shift_depth", "shift_row", "shift_speed"))
+    COUNT = len(SLOTS) + sum(len(p.parameters) if q is None else len(slots_of(q)) for p, q in own)
     Table = ti.types.ndarray(dtype=ti.f64, ndim=2)
     Line = ti.types.ndarray(dtype=ti.f64, ndim=1)
-    Whole = ti.types.ndarray(dtype=ti.i32, ndim=1)
+    Whole, Long = (ti.types.ndarray(dtype=dtype, ndim=1) for dtype in (ti.i32, ti.i64))
     Cube = ti.types.ndarray(dtype=ti.f64, ndim=3)
 
     @ti.kernel
     def push_all(
-        numbers: Table, lane_path: Whole, starts: Whole, times: Line, depth: Line, speed: Line, out: Table
+        numbers: Table, lane_path: Whole, starts: Whole, like: Whole, begins: Long, times: Line, depth: Line,
+        speed: Line, ways: Line, out: Line,
     ):  # fmt: skip
         for k in range(numbers.shape[0]):  # type: ignore[attr-defined]
             path = lane_path[k]
+            lane = ti.Vector([numbers[k, i] for i in ti.static(range(COUNT))])
+            # `ways` are those of the lane `like[path]`; mostly the path's lanes share them.
+            n = like[path]
+            same = lane[SPEED_SCALE] == numbers[n, SPEED_SCALE] and lane[SHIFT_SPEED] == numbers[n, SHIFT_SPEED]
             top, deepest = 0.0, 0.0
             before, share = 0.0, 0.0
             gone = ti.Vector([0.0 for _ in ti.static(range(settling))])
             for row in range(starts[path], starts[path + 1]):
-                z, v = depth[row] + numbers[k, SHIFT_DEPTH], speed[row] + numbers[k, SHIFT_SPEED]
+                z, v = depth[row] + lane[SHIFT_DEPTH], speed[row] + lane[SHIFT_SPEED]
                 if z <= 0.0:
                     top, before, share = 0.0, 0.0, 0.0
                     gone.fill(0.0)
                 else:
                     if row > starts[path]:
                         half = 0.5 * (times[row] - times[row - 1])
-                        gone = settled(settled(gone, before, half, numbers, k), z, half, numbers, k)
-                    share = taken(z, 1.0 if z > before else -1.0, before, share, numbers, k)
+                        gone = settled(settled(gone, before, half, lane), z, half, lane)
+                    if lane[HELD] != 0.0:
+                        share = taken(z, 1.0 if z > before else -1.0, before, share, lane)
                     before = z
                 top, deepest = ti.max(top, z), ti.max(deepest, z)
-                way = ti.tanh(v / numbers[k, SPEED_SCALE])
-                here = z + numbers[k, SHIFT_ROW]
-                given = gone.sum() + numbers[k, GIVEN_WAY]
-                out[k, row - starts[path]] = force(here, v, way, top, deepest, z, share, given, numbers, k)
+                way = ways[row]
+                if not same:
+                    way = ti.tanh(v / lane[SPEED_SCALE])
+                here = z + lane[SHIFT_ROW]
+                given = gone.sum() + lane[GIVEN_WAY]
+                out[begins[k] + row - starts[path]] = force(here, v, way, top, deepest, z, share, given, lane)
 
     @ti.kernel
     def fall_all(numbers: Table, lane_path: Whole, starts: Whole, times: Line, speeds: Line, steps: Line, out: Cube):
         for k in range(numbers.shape[0]):  # type: ignore[attr-defined]
             path = lane_path[k]
-            m, g = numbers[k, MASS], numbers[k, GRAVITY]
+            lane = ti.Vector([numbers[k, i] for i in ti.static(range(COUNT))])
+            m, g = lane[MASS], lane[GRAVITY]
             z, v, t, way = 0.0, speeds[path], 0.0, 1.0
             top, deepest = 0.0, 0.0
             turn_z, turn_w = 0.0, 0.0
@@ -400,13 +392,13 @@ def _kernels(own: _Own) -> tuple[Any, Any]:
                         zs, vs, z1, v1, share = z, v, z, v, 0.0
                         half = gone  # the bed gives way by half before the step and by half after it
                         if inside == 1:
-                            half = settled(gone, z, 0.5 * dt, numbers, k)
+                            half = settled(gone, z, 0.5 * dt, lane)
                         for stage in range(4):
                             a = g
                             if inside == 1:
                                 here = ti.max(zs, 1e-300)
-                                a = g - force(here, vs, way, top, deepest, turn_z, turn_w, half.sum(), numbers, k) / m
-                                a = a / (1.0 + carried(here, way, numbers, k))
+                                a = g - force(here, vs, way, top, deepest, turn_z, turn_w, half.sum(), lane) / m
+                                a = a / (1.0 + carried(here, way, lane))
                             weight = dt / 6.0 if stage == 0 or stage == 3 else dt / 3.0
                             z1 += weight * vs
                             v1 += weight * a
@@ -428,7 +420,7 @@ def _kernels(own: _Own) -> tuple[Any, Any]:
                             t += dt
                             low, high, halvings = 0.0, 0.0, 0
                             if inside == 1:
-                                gone = settled(half, ti.max(z, 1e-300), 0.5 * dt, numbers, k)
+                                gone = settled(half, ti.max(z, 1e-300), 0.5 * dt, lane)
                                 top, deepest = ti.max(top, z), ti.max(deepest, z)
                             if found and crossed:
                                 z = 0.0
@@ -438,18 +430,18 @@ def _kernels(own: _Own) -> tuple[Any, Any]:
                                 else:
                                     inside, way = 1, 1.0
                                     # On what supports it at the surface it would hop for ever, ever less.
-                                    bears = force(1e-300, 0.0, 1.0, 0.0, deepest, 0.0, 0.0, 0.0, numbers, k)
+                                    bears = force(1e-300, 0.0, 1.0, 0.0, deepest, 0.0, 0.0, 0.0, lane)
                                     if v < SETTLED and bears > m * g:
                                         v, resting = 0.0, 1
                                 turn_z, turn_w = 0.0, 0.0
                             elif found and turned:
                                 v = 0.0
-                                turn_z, turn_w = z, taken(z, way, turn_z, turn_w, numbers, k)
+                                turn_z, turn_w = z, taken(z, way, turn_z, turn_w, lane)
                                 down, up = 0.0, 0.0
                                 given = gone.sum()
                                 for side in range(2):
                                     tried = 1.0 - 2.0 * side
-                                    a = g - force(z, 0.0, tried, top, deepest, turn_z, turn_w, given, numbers, k) / m
+                                    a = g - force(z, 0.0, tried, top, deepest, turn_z, turn_w, given, lane) / m
                                     if side == 0:
                                         down = a
                                     else:
@@ -465,8 +457,8 @@ def _kernels(own: _Own) -> tuple[Any, Any]:
                     else:
                         pushed, more = 0.0, 0.0
                         if inside == 1 and resting == 0:
-                            pushed = force(z, v, way, top, deepest, turn_z, turn_w, gone.sum(), numbers, k)
-                            more = carried(z, way, numbers, k)
+                            pushed = force(z, v, way, top, deepest, turn_z, turn_w, gone.sum(), lane)
+                            more = carried(z, way, lane)
                         out[k, at, 0] = z
                         out[k, at, 1] = v
                         out[k, at, 2] = 0.0 if resting == 1 else (g - pushed / m) / (1.0 + more)

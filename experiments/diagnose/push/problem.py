@@ -20,34 +20,26 @@ from experiments.campaign import Campaign, EffectTable, PenetrationCampaign, wri
 from experiments.diagnose.core.effect_texts import push_advice
 from experiments.diagnose.fit.forms import PENETRATION_HOOKS, OwnEffect, shapes_of
 from experiments.diagnose.fit.localise import acceleration
-from experiments.diagnose.fit.problem import (
-    Array,
-    Estimate,
-    Finding,
-    Form,
-    Planned,
-    Problem,
-    Samples,
-    TrialInfo,
-    Values,
-)
+from experiments.diagnose.fit.problem import Array, Estimate, Finding, Form, Problem, Values
+from experiments.diagnose.fit.trials import Planned, Samples, TrialInfo
 from experiments.diagnose.noise.jitter import Shaken
 
-from .beds import centred, scatter_parameters
+from .beds import OWN, centred, own_numbers, scatter_parameters
 from .data import Prepared, of_drop, prepare, stds, tip_depth
 from .depth import SmoothDepth
 from .design import best_push
-from .doubt import bounded, off_rest, off_surface, path_error, reversing, touching, turning
+from .doubt import bounded, jumping, off_rest, off_surface, path_error, reversing, touching, turning
 from .forms import physical, push_forms, unit_of
-from .law import PHASES, SLOTS, fall, push, slot_places, slot_table
+from .law import PHASES, fall, push_each
 from .model_file import Pairs, model_of, range_of
 from .parameters import base_parameters, comes_back, diameters_of, find_scales, named, speeds_of
 from .remarks import SURE, Push, at_one_speed, contradict, facts, highest_dampings, how_to_determine
+from .slots import PLACES, slot_places, slot_table
 from .zeros import find_force_zeros
 
 __all__ = ["PenetrationProblem", "make_problem"]
 
-_SLOT = {name: place for place, name in enumerate(SLOTS)}
+Asked = Sequence[tuple[Sequence[Values], Sequence[Form]]]  # points, and the forms that they are points of
 _SHALLOW = 0.02  # share of D that counts as just below the surface
 
 
@@ -126,36 +118,45 @@ class PenetrationProblem(Problem):
         read = finding.channel == "force" and "above the surface" in finding.what
         return read and self._zeros is not None and self._zeros.usual(finding.trial)
 
-    def _fill(self, trial: Prepared, points: Sequence[tuple[Values, Sequence[Form]]], into: Array) -> None:
-        """Fill the slots of a trial's lanes, one a point, shape [points, slot_count]."""
-        into[:, _SLOT["mass"]] = self.tables.spike.mass or 1.0
-        into[:, _SLOT["gravity"]] = trial.table.gravity
-        into[:, _SLOT["reference"]] = self._scales.depth
-        into[:, _SLOT["radius_depth"]] = tip_depth(self.tables.spike, trial.diameter)
-        if trial.smooth is not None:
-            fast = float(np.abs(trial.smooth.speed).max())
-            into[:, _SLOT["speed_scale"]] = max(0.02 * fast, 2 * float(np.median(trial.smooth.speed_std)), 1e-12)
-        size, (k, stated_k) = trial.diameter / self._middle, self._stated("stiffness", trial.diameter)
-        c, stated_c = self._stated("damping", trial.diameter)
-        own = [f"{kind}[{trial.info.id}]" for kind in ("bed", "bed damping", "bed unloading", "depth zero")]
-        for (values, forms), lane in zip(points, into, strict=True):
-            bed, damper, unloading, zero = (values.get(name, 0.0) for name in own)
-            lane[_SLOT["stiffness"]] = stiffness = values.get(k, stated_k) * (1.0 + bed)
-            lane[_SLOT["damping"]] = values.get(c, stated_c) * (1.0 + bed) * (1.0 + damper)
-            lane[_SLOT["unload_change"]] = unloading
+    def _fill(self, trials: Sequence[Prepared], asked: Asked, into: Array) -> None:
+        """Fill the slots of lanes, shape [trials, points, slot_count]; points in the order of `asked`."""
+        for trial, lanes in zip(trials, into, strict=True):
+            lanes[:, PLACES["mass"]] = self.tables.spike.mass or 1.0
+            lanes[:, PLACES["gravity"]] = trial.table.gravity
+            lanes[:, PLACES["radius_depth"]] = tip_depth(self.tables.spike, trial.diameter)
             if trial.smooth is not None:
-                lane[_SLOT["shift_depth"]] = -zero
-            for form in forms:
-                for parameter in form.parameters:
-                    value = values.get(parameter.name, parameter.value)
-                    slot = form.slots[parameter.name]
-                    lane[self._places[slot.name]] = physical(slot, value, self._scales, stiffness=stiffness, size=size)
+                lanes[:, PLACES["speed_scale"]] = trial.smooth.slow
+        into[..., PLACES["reference"]] = self._scales.depth
+        every = [values for points, _ in asked for values in points]
+        given = set[str]().union(*every)
+        bed, damper, unloading, zero = (own_numbers(every, kind, trials, given) for kind in OWN)
+        k, c = (self._of_each(every, which, trials) for which in ("stiffness", "damping"))
+        into[..., PLACES["stiffness"]] = stiffness = k * (1.0 + bed)
+        into[..., PLACES["damping"]] = c * (1.0 + bed) * (1.0 + damper)
+        into[..., PLACES["unload_change"]] = unloading
+        if trials[0].driven:
+            into[..., PLACES["shift_depth"]] = -zero
+        sizes, start = np.array([[trial.diameter / self._middle] for trial in trials]), 0
+        for points, forms in asked:
+            rows = slice(start, start := start + len(points))
+            for parameter, slot in [(p, form.slots[p.name]) for form in forms for p in form.parameters]:
+                value = np.array([values.get(parameter.name, parameter.value) for values in points])
+                found = physical(slot, value, self._scales, stiffness=stiffness[:, rows], size=sizes)
+                into[:, rows, self._places[slot.name]] = found
+
+    def _of_each(self, points: Sequence[Values], which: str, trials: Sequence[Prepared]) -> Array:
+        """K or C of each trial at each point, without its bed, shape [trials, points]."""
+        found: dict[float, Array] = {}
+        for diameter in {trial.diameter for trial in trials}:
+            name, stated = self._stated(which, diameter)
+            found[diameter] = np.array([values.get(name, stated) for values in points])
+        return np.stack([found[trial.diameter] for trial in trials])
 
     def _file(self, form: Form) -> str | None:
         """Name of the file that an effect is from; None for the library's."""
         return next((effect.file.name for effect in self.own if effect.id == form.effect), None)
 
-    def _has_own(self, forms: Sequence[Form]) -> bool:
+    def _hasown_numbers(self, forms: Sequence[Form]) -> bool:
         """Whether one of the effects is from a file."""
         return bool(self.own) and any(self._file(form) for form in forms)
 
@@ -173,61 +174,59 @@ class PenetrationProblem(Problem):
     def _run(self, points: Sequence[Values], forms: Sequence[Form], trials: Sequence[Prepared],
              shifts: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> list[Array]:  # fmt: skip
         """Forces [points, n] of driven trials, or motions [points, n, 4] of drops; all trials of one mode."""
-        return self._run_each([(values, forms) for values in points], trials, shifts)
+        return self._run_each([(points, forms)], trials, shifts)
 
-    def _run_each(self, points: Sequence[tuple[Values, Sequence[Form]]], trials: Sequence[Prepared],
+    def _run_each(self, asked: Asked, trials: Sequence[Prepared],
                   shifts: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> list[Array]:  # fmt: skip
-        """The same of points that have forms of their own, all or none of them from files."""
-        count = len(points)
+        """The same of points that have forms of their own, all or none of them from files; one after another."""
+        count = sum(len(points) for points, _ in asked)
         # Effects from files are compiled in where one of them is on: another kernel.
-        own = self.own if self._has_own(points[0][1]) else ()
+        own = self.own if self._hasown_numbers(asked[0][1]) else ()
         numbers = slot_table(count * len(trials), own)
-        lanes = np.repeat(np.arange(len(trials), dtype=np.int32), count)
-        for place, trial in enumerate(trials):
-            self._fill(trial, points, numbers[place * count : (place + 1) * count])
-        numbers[:, _SLOT["shift_depth"]] += shifts[0]
-        numbers[:, _SLOT["shift_speed"]], numbers[:, _SLOT["shift_row"]] = shifts[1:]
+        self._fill(trials, asked, numbers.reshape(len(trials), count, -1))
+        numbers[:, PLACES["shift_depth"]] += shifts[0]
+        numbers[:, PLACES["shift_speed"]], numbers[:, PLACES["shift_row"]] = shifts[1:]
         starts = np.cumsum([0, *(len(trial.time) for trial in trials)]).astype(np.int32)
         if trials[0].driven:
             depth, speed = (np.concatenate([getattr(t.path, name) for t in trials]) for name in ("depth", "speed"))
-            out = push(numbers, lanes, starts, depth, speed, own, np.concatenate([trial.time for trial in trials]))
-            for place, trial in enumerate(trials):
-                zeros = np.array([values.get(f"force zero[{trial.info.id}]", 0.0) for values, _ in points])
-                if zeros.any():
-                    out[place * count : (place + 1) * count] += zeros[:, None]
-        else:
-            speeds = np.array([trial.table.speed or 0.0 for trial in trials])
-            out = fall(numbers, lanes, starts, np.concatenate([trial.time for trial in trials]), speeds, own)
+            forces = push_each(numbers, starts, depth, speed, own, np.concatenate([trial.time for trial in trials]))
+            every = [values for points, _ in asked for values in points]
+            zeros = own_numbers(every, "force zero", trials, set[str]().union(*every))
+            return [one + zero[:, None] if zero.any() else one for one, zero in zip(forces, zeros, strict=True)]
+        lanes = np.repeat(np.arange(len(trials), dtype=np.int32), count)
+        speeds = np.array([trial.table.speed or 0.0 for trial in trials])
+        out = fall(numbers, lanes, starts, np.concatenate([trial.time for trial in trials]), speeds, own)
         return [out[p * count : (p + 1) * count, : len(trial.time)] for p, trial in enumerate(trials)]
 
     def evaluate_together(
-        self, asked: Sequence[tuple[Sequence[Values], Sequence[Form]]], trials: Sequence[str], share: float = 1.0
+        self, asked: Asked, trials: Sequence[str], share: float = 1.0
     ) -> list[list[dict[str, Array]]]:
         """Whitened residuals, of all of their time."""
         found: list[list[dict[str, Array]]] = [[] for _ in asked]
         for own in (False, True):
-            mine = [k for k, (_, forms) in enumerate(asked) if self._has_own(forms) == own]
-            points = [(values, asked[k][1]) for k in mine for values in asked[k][0]]
-            models: dict[str, Array] = {}
+            mine = [k for k, (points, forms) in enumerate(asked) if points and self._hasown_numbers(forms) == own]
+            residuals: dict[str, Array] = {}
             for driven in (True, False):
-                chosen = [id for id in trials if self.prepared[id].driven == driven]
-                if chosen and points:
-                    out = self._run_each(points, [self.prepared[id] for id in chosen])
-                    models |= dict(zip(chosen, out, strict=True))
-            rest = iter(
-                {id: self._residuals(self.prepared[id], models[id][k]) for id in trials} for k in range(len(points))
-            )
+                chosen = [self.prepared[id] for id in trials if self.prepared[id].driven == driven]
+                if chosen and mine:
+                    made = self._run_each([asked[k] for k in mine], chosen)
+                    residuals |= {t.info.id: self._residuals(t, one) for t, one in zip(chosen, made, strict=True)}
+            rest = iter([dict(zip(residuals, rows, strict=True)) for rows in zip(*residuals.values(), strict=True)])
             for k in mine:
                 found[k] = [next(rest) for _ in asked[k][0]]
         return found
 
     def _residuals(self, trial: Prepared, model: Array) -> Array:
+        """Of a trial at all points, shape [points, sample_count]; `model`: as `_run` has it."""
         if not trial.driven:
-            rest, shaken = self._missed(trial, model), self._shaken.get(trial.info.id)
-            return rest if shaken is None else shaken.whitened(rest)
-        directions, shrink, doubtful = self._whitening[trial.info.id]
-        rest = (trial.other - model)[trial.has_other] / stds(self.tables, True)[1] / doubtful
-        rest = rest - directions @ (shrink * (directions.T @ rest)) if len(shrink) else rest
+            shaken = self._shaken.get(trial.info.id)
+            missed = [self._missed(trial, one) for one in model]
+            return np.stack(missed if shaken is None else [shaken.whitened(rest) for rest in missed])
+        directions, shrunk, noise = self._whitening[trial.info.id]
+        rest = trial.other - model if trial.has_other.all() else (trial.other - model)[:, trial.has_other]
+        rest /= noise
+        if len(directions.T):
+            rest -= (rest @ directions) @ shrunk
         return bounded(rest)
 
     def _missed(self, trial: Prepared, model: Array) -> Array:
@@ -271,23 +270,16 @@ class PenetrationProblem(Problem):
             factor = path_error(smooth, by_depth, by_row) + by_speed[:, None] * smooth.speed_error
             if self._zeros is not None:
                 factor = np.column_stack([factor, np.full(len(factor), self._zeros.std)])
-            # Where the error may cross the surface or the turning point, the force is no linear function of it.
-            bend = np.abs(by_speed).max() * smooth.speed_std * (np.abs(smooth.speed) < 3 * smooth.speed_std)
-            jump = float(np.abs(by_speed).max() * np.abs(smooth.speed).max())
-            # An effect may begin with a jump at the surface: as large as the force is measured to be just below it.
-            depth_here = np.maximum(8 * smooth.depth_std, _SHALLOW * self._scales.depth)
-            shallow = (smooth.depth > 0) & (smooth.depth < depth_here) & trial.has_other
-            below = float(np.median(np.abs(trial.other[shallow]))) if shallow.any() else 0.0
-            start = max(jump, below) + np.abs(by_depth).max() * smooth.depth_std
-            touch = start * touching(trial)
+            jumps = jumping(trial, by_depth, by_speed, _SHALLOW * self._scales.depth)
             rows = trial.has_other
             turn, held = turning(smooth.speed[rows], smooth.speed_std[rows], trial.other[rows], std_force)
             shaken = self._along.get(trial.info.id, 0.0)
-            doubtful = np.sqrt(1 + ((bend**2 + touch**2)[rows] + turn**2) / std_force**2 + shaken**2)
+            doubtful = np.sqrt(1 + (jumps[rows] + turn**2) / std_force**2 + shaken**2)
             factor = np.column_stack([factor[rows], held])
             left, sizes, _ = np.linalg.svd(factor / std_force / doubtful[:, None], full_matrices=False)
             kept = sizes > 1e-3
-            self._whitening[trial.info.id] = (left[:, kept], 1 - 1 / np.sqrt(1 + sizes[kept] ** 2), doubtful)
+            left, shrink = left[:, kept], 1 - 1 / np.sqrt(1 + sizes[kept] ** 2)
+            self._whitening[trial.info.id] = (left, shrink[:, None] * left.T, std_force * doubtful)
 
     def _slopes(
         self, values: Values, forms: Sequence[Form], driven: list[Prepared]
@@ -488,7 +480,8 @@ class PenetrationProblem(Problem):
         ) -> Array:
             none = np.zeros((len(time), 0))
             like = next(trial for trial in driven if trial.diameter == diameter)
-            return self._run_each(points, [replace(like, time=time, smooth=SmoothDepth(z, v, none, none))])[0]
+            like = replace(like, time=time, smooth=SmoothDepth(z, v, none, none))
+            return self._run_each([([values], forms) for values, forms in points], [like])[0]
 
         return best_push(
             one, other, predict, inflation=inflation, diameters=sorted({trial.diameter for trial in driven}),

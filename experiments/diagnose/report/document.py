@@ -10,6 +10,7 @@ series/<trial>.<channel>.csv    t_s,measured,before,after,std,std_after,phase (a
 """
 
 import math
+import re
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
@@ -42,6 +43,7 @@ __all__ = ["document", "write_diagnosis"]
 
 COUNTS = tomllib.loads(Path(__file__).with_name("counts.toml").read_text(encoding="utf-8"))
 _BESIDE = 2  # readings to either side of the deepest one, with which its force is averaged
+_SAME = 1 - 1e-9  # share of the largest force from which on one is as large
 _ROUNDS = 8  # of refits without one of the effects
 _SIGNALS = ("force", "accel", "ax", "ay")  # channels that read 0 where nothing pushes: a change is a share of these
 
@@ -191,8 +193,9 @@ def _own_force(found: Diagnosis, rest: tuple[Form, ...]) -> dict[str, Any] | Non
         if "depth_m" not in whole or not len(whole["depth_m"]):
             continue
         own = whole["model"] - found.problem.compare(found.best_values, rest, trial)["force"]["model"]
-        place = int(np.argmax(np.abs(np.nan_to_num(own))))
-        if most is None or abs(own[place]) > abs(most["force_N"]):
+        sizes = np.abs(np.nan_to_num(own))
+        place = int(np.argmax(sizes > _SAME * sizes.max()))  # on a stiffer way back all rows may have the largest
+        if most is None or _SAME * abs(own[place]) > abs(most["force_N"]):
             most = {"trial": trial, "depth_m": float(whole["depth_m"][place]), "force_N": float(own[place]),
                     "of_N": float(whole["model"][place])}  # fmt: skip
     return most
@@ -321,13 +324,22 @@ def _write_model(path: Path, found: Diagnosis, notes: Mapping[str, Json] | None 
 
 
 def _write_near_models(folder: Path, found: Diagnosis, near: Sequence[Near]) -> list[Json]:
-    """Write the models of other answers within the margin, and return their effects and files."""
+    """Write the models of other answers within the margin, and return their effects, forms and files. A model of the
+    same effects has its forms in the name of its file."""
     listed = []
-    for effects, other in near_models(found, near).items():
-        file = f"model-{'-and-'.join(effects)}.toml"
+    for other in near_models(found, near):
+        effects = other.effects
+        forms = sorted((form.id for form in other.forms), key=lambda id: effects.index(id.partition(":")[0]))
+        same = set(effects) == set(found.effects)
+        file = f"model-{'-and-'.join(map(_as_file, forms) if same else effects)}.toml"
         _write_model(folder / file, other)
-        listed.append({"effects": list(effects), "file": file})
+        listed.append({"effects": list(effects), "forms": forms, "file": file})
     return listed
+
+
+def _as_file(form: str) -> str:
+    """A form's id as part of a file's name."""
+    return re.sub("[^a-z0-9]+", "-", form.lower()).strip("-")
 
 
 def _equations(found: Diagnosis) -> list[Json]:

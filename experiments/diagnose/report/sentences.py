@@ -16,7 +16,7 @@ from vis.diagnose.held_out import worsens_held_out
 from vis.page.sentences import Sentences
 
 __all__ = [
-    "behind_words", "candidate_rows", "findings_in_words", "near_model_sentences", "remark_sentences", "say",
+    "behind_words", "candidate_rows", "findings_in_words", "remark_sentences", "say",
     "setting_words", "shares_words",
     "size_sentences", "small_names", "spread_sentences", "sure_sentences", "told_tables", "unnamed_sentence",
     "where_sentences", "worse_sentences",
@@ -140,12 +140,6 @@ def _needed(near: Row) -> str:
     sure = max(near["evidence_behind"], near.get("left_out_behind") or 0.0) >= LEAD
     less = "" if sure else ", so it is the less certain one"
     return f"a further name needs {near['needed']:.0f} by evidence{less}"
-
-
-def near_model_sentences(diagnosis: Row) -> list[str]:
-    """Which files have the models of near rivals, and the command that predicts with them."""
-    files = [row["file"] for row in diagnosis.get("near_models", [])]
-    return [say(f"near_models_{diagnosis['kind']}", files=" and ".join(files), file=files[0])] if files else []
 
 
 def size_sentences(diagnosis: Row) -> list[str]:

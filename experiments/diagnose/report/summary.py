@@ -13,7 +13,6 @@ from vis.page.numbers import foldable, quote
 
 from .sentences import (
     behind_words,
-    near_model_sentences,
     remark_sentences,
     say,
     shares_words,
@@ -23,7 +22,7 @@ from .sentences import (
     unnamed_sentence,
     worse_sentences,
 )
-from .to_use import law_sentences, number_words, peak_sentences, use_sentences
+from .to_use import law_sentences, near_model_sentences, number_words, peak_sentences, use_sentences
 
 __all__ = ["scatter_sentence", "summary_sentences", "title_words"]
 

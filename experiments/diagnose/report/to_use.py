@@ -11,7 +11,8 @@ from vis.page.numbers import foldable, quote
 
 from .sentences import say
 
-__all__ = ["law_sentences", "number_words", "peak_sentences", "unloading_sentences", "use_sentences"]
+__all__ = ["law_sentences", "near_model_sentences", "number_words", "peak_sentences", "unloading_sentences",
+           "use_sentences"]  # fmt: skip
 
 _NEUTRAL = 2.0  # standard errors within which a number is not distinguished from 0
 _STRONG, _PAIRS = 0.9, 3  # correlation from which on it is reported, and of how many pairs
@@ -131,3 +132,10 @@ def _correlated(errors: Mapping[str, Any]) -> list[str]:
 def _at(name: str) -> str:
     _, _, diameter = name.partition("@")
     return f" for {1e3 * float(diameter):g} mm of diameter" if diameter else ""
+
+
+def near_model_sentences(diagnosis: Mapping[str, Any]) -> list[str]:
+    """Which files have the models that trials do not exclude, and the command that predicts with them."""
+    files = [row["file"] for row in diagnosis.get("near_models", [])]
+    listed = " and ".join(filter(None, (", ".join(files[:-1]), *files[-1:])))
+    return [say(f"near_models_{diagnosis['kind']}", files=listed, file=files[0])] if files else []

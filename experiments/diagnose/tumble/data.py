@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.campaign import Campaign, TumbleCampaign
-from experiments.diagnose.fit.problem import Array, TrialInfo
+from experiments.diagnose.fit.problem import Array
+from experiments.diagnose.fit.trials import TrialInfo
 from experiments.diagnose.noise.replicates import parted
 
 __all__ = ["CHANNELS", "LOST", "ZERO_STD", "TrialData", "TumbleData", "thinned", "trial_infos", "tumble_data", "whiten"]

@@ -17,8 +17,9 @@ from experiments.campaign import Campaign, EffectTable, TumbleModel, write_model
 from experiments.diagnose.core.effect_texts import advice
 from experiments.diagnose.fit.fitting import SCAN
 from experiments.diagnose.fit.forms import OwnEffect, shapes_of
-from experiments.diagnose.fit.problem import Array, Finding, Form, Parameter, Problem, Samples, Values
+from experiments.diagnose.fit.problem import Array, Finding, Form, Parameter, Problem, Values
 from experiments.diagnose.fit.together import each
+from experiments.diagnose.fit.trials import Samples
 from experiments.diagnose.noise.jitter import Shaken
 from rigid.planar.trajectory import STATES
 from rigid.terms import EFFECTS

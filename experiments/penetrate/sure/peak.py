@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from coupling import Penetration
 from experiments.campaign.model_errors import SHARE, ModelErrors
 from experiments.diagnose.fit.forms import OwnEffect
-from experiments.diagnose.push.law import SLOTS, push, slot_places
+from experiments.diagnose.push.law import push
+from experiments.diagnose.push.slots import SLOTS, slot_places
 from experiments.runs.types import Json
 from vis.page.sentences import Sentences
 

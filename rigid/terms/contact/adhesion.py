@@ -93,8 +93,10 @@ def push_pull(
         grown = pull
         if pull_deep != 0.0:
             grown = grown + pull_deep * (most / reference) ** pull_growth
-        total = total + grown * mobilised(held, pull_sharpness)
-        total = total + pull_short * held * exp(1.0 - held)
+        if grown != 0.0:
+            total = total + grown * mobilised(held, pull_sharpness)
+        if pull_short != 0.0:
+            total = total + pull_short * held * exp(1.0 - held)
     if pull_ever != 0.0 and z < ever:
         part = mobilised((ever - z) / pull_reach, pull_sharpness)
         total = total + pull_ever * (ever / reference) ** pull_growth * part

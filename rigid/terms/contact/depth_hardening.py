@@ -85,7 +85,8 @@ def push_loading(
     if hardening_steeper != 0.0:
         y = max(x, 1e-9) ** (1.0 + hardening_steeper)
     force = force * (1.0 + hardening_quadratic * y + hardening_cubic * x * x)
-    force = force / max(1.0 - hardening_locking * x, 0.05)
+    if hardening_locking != 0.0:
+        force = force / max(1.0 - hardening_locking * x, 0.05)
     if hardening_early != 0.0:
         force = force + hardening_early * (1.0 - exp(-depth / hardening_reach))
     return force

@@ -65,8 +65,10 @@ def push_force(
 ):
     """b v^2 of loading, b by the depth in one of four ways, or with its mass; or both ways."""
     sinking = max(v, 0.0)
-    wide = min(z / radius_depth, 1.0)
-    share = drag + drag_carried + drag_deep * x + drag_tip * wide * (2.0 - wide)
+    share = drag + drag_carried + drag_deep * x
+    if drag_tip != 0.0:
+        wide = min(z / radius_depth, 1.0)
+        share = share + drag_tip * wide * (2.0 - wide)
     if drag_onset != 0.0:
         share = share + drag_onset * mobilised(z / drag_reach, drag_sharpness)
     return share * sinking * sinking + drag_both * v * abs(v)

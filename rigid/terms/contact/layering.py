@@ -8,7 +8,9 @@ from rigid.terms.candidate import Candidate, Form, Number, Push, Starts, amplitu
 def push_loading(grown, depth, layer_depth, layer_width, layer_slope, layer_step, layer_factor, layer_bump):
     """From a depth on another factor, a step or a slope, over a width; or a crust there."""
     force = grown
-    away = (depth - layer_depth) / layer_width
+    away = 0.0
+    if layer_step != 0.0 or layer_factor != 0.0 or layer_bump != 0.0 or layer_slope != 0.0:
+        away = (depth - layer_depth) / layer_width
     if layer_step != 0.0 or layer_factor != 0.0:
         inside = 1.0 / (1.0 + exp(min(-away, 60.0)))
         force = force * (1.0 + layer_factor * inside)

@@ -17,7 +17,7 @@ from experiments.cli.main import main
 from experiments.diagnose.core.diagnosis import diagnose
 from experiments.diagnose.core.renoised import whitened_fit
 from experiments.diagnose.fit.fitting import Model, Whitener
-from experiments.diagnose.fit.problem import TrialInfo
+from experiments.diagnose.fit.trials import TrialInfo
 from experiments.diagnose.noise.replicates import odd_trials, split_trials
 from experiments.diagnose.push.problem import make_problem
 from experiments.diagnose.report.document import document
@@ -94,10 +94,10 @@ def test_a_number_that_neither_data_nor_prior_determine_has_no_standard_error():
     names = [p.name for p in found.base.model.parameters]
     assert all(entry["std"] > 0 for entry in found.base_parameters(found.base).values())
     k, c = names.index("stiffness"), names.index("damping")
-    for column in (0.0, 1e-140, found.base.jacobian[:, k]):
-        slopes = found.base.jacobian.copy()
+    for column in (0.0, 1e-140, found.base.slopes[:, k]):
+        slopes = found.base.slopes.copy()
         slopes[:, c] = column
-        lost = replace(found.base, jacobian=slopes)
+        lost = replace(found.base, slopes=slopes)
         said = document(replace(found, base=lost, best=lost))
         jsonschema.validate(said, SCHEMA)
         assert said["base"]["after"]["damping"]["std"] is None

@@ -14,7 +14,8 @@ from scipy.integrate import solve_ivp
 from experiments.diagnose.core.effect_texts import PENETRATION, TUMBLE, equation, equations_of, with_comments
 from experiments.diagnose.fit.forms import shapes_of
 from experiments.diagnose.push.forms import Scales, physical, push_forms
-from experiments.diagnose.push.law import SLOTS, push, slot_table
+from experiments.diagnose.push.law import push
+from experiments.diagnose.push.slots import SLOTS, slot_table
 from experiments.diagnose.tumble import forms as tumble
 from rigid.terms import EFFECTS
 

@@ -18,7 +18,8 @@ from experiments.diagnose.fit.fitting import Model, Whitener, fit, settled
 from experiments.diagnose.fit.gate import Gate, held_out_gate, open_gate
 from experiments.diagnose.fit.gate import _read as read_null
 from experiments.diagnose.fit.gate import _write as write_null
-from experiments.diagnose.fit.problem import Parameter, Problem, Samples, TrialInfo
+from experiments.diagnose.fit.problem import Parameter, Problem
+from experiments.diagnose.fit.trials import Samples, TrialInfo
 from experiments.diagnose.noise.colour import find_colours, find_white_noise
 from experiments.diagnose.noise.replicates import (
     Scatter,

@@ -17,7 +17,8 @@ import experiments
 from experiments.campaign import read_model
 from experiments.cli.main import main
 from experiments.diagnose.fit.forms import load_own
-from experiments.diagnose.push.law import push, slot_places, slot_table
+from experiments.diagnose.push.law import push
+from experiments.diagnose.push.slots import slot_places, slot_table
 from experiments.diagnose.tumble.data import tumble_data
 from experiments.diagnose.tumble.forms import physical, tumble_forms
 from experiments.diagnose.tumble.forward import Forward

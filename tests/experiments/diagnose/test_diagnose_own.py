@@ -13,8 +13,9 @@ from penetration_campaigns import DAMPING, STIFFNESS, campaign_of, driven_trial,
 from experiments.campaign import read_model
 from experiments.cli.main import main
 from experiments.diagnose.fit.forms import load_own, own_starts, parameters_of
-from experiments.diagnose.push.law import SLOTS, fall, push, slot_table
+from experiments.diagnose.push.law import fall, push
 from experiments.diagnose.push.problem import make_problem
+from experiments.diagnose.push.slots import SLOTS, slot_table
 
 GUIDE = Path(slow_drive.__file__).parents[1] / "docs" / "diagnose.md"
 SLOW = Path(slow_drive.__file__)

@@ -15,8 +15,9 @@ from experiments.diagnose.fit.fitting import Model, Whitener, fit
 from experiments.diagnose.fit.localise import depends_on
 from experiments.diagnose.push.data import prepare
 from experiments.diagnose.push.depth import smooth_depth
-from experiments.diagnose.push.law import SLOTS, fall, push, slot_table
+from experiments.diagnose.push.law import fall, push
 from experiments.diagnose.push.problem import make_problem
+from experiments.diagnose.push.slots import SLOTS, slot_table
 
 SLOT = {name: place for place, name in enumerate(SLOTS)}
 

@@ -25,8 +25,9 @@ from experiments.diagnose.fit.fitting import Model, Whitener
 from experiments.diagnose.fit.forms import shapes_of
 from experiments.diagnose.noise.replicates import split_trials
 from experiments.diagnose.push.forms import push_forms
-from experiments.diagnose.push.law import SLOTS, fall, push, slot_table
+from experiments.diagnose.push.law import fall, push
 from experiments.diagnose.push.problem import make_problem
+from experiments.diagnose.push.slots import SLOTS, slot_table
 
 ONSET = 1e-3
 

@@ -15,7 +15,7 @@ from experiments.diagnose.fit import gate
 from experiments.diagnose.fit.evidence import Hypothesis, excess, score, slow_count, tempered
 from experiments.diagnose.fit.fitting import Linear, Model, Whitener, fit
 from experiments.diagnose.fit.gate import open_gate
-from experiments.diagnose.fit.problem import TrialInfo
+from experiments.diagnose.fit.trials import TrialInfo
 from experiments.diagnose.push.problem import make_problem
 from experiments.diagnose.report.document import document
 

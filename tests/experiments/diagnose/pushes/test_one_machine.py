@@ -8,7 +8,8 @@ from benchmarks.hidden.suite import make_case
 from experiments.campaign import read_campaign, write_campaign
 from experiments.diagnose.push.data import prepare
 from experiments.diagnose.push.drive import Drive
-from experiments.diagnose.push.law import SLOTS, fall, slot_table
+from experiments.diagnose.push.law import fall
+from experiments.diagnose.push.slots import SLOTS, slot_table
 
 GRAVITY, MASS, STIFFNESS, DAMPING = 9.80665, 0.5, 930.0, 4.8
 

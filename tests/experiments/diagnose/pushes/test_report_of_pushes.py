@@ -16,7 +16,7 @@ from experiments.campaign.tables import ERRORS_NOTE, OTHERS_NOTE, SCATTER_NOTE
 from experiments.check import find_implausible
 from experiments.check.shifted import shifted_depths
 from experiments.diagnose import experiment
-from experiments.diagnose.core.near import nearest_each
+from experiments.diagnose.core.near import nearest_each, other_forms
 from experiments.diagnose.core.rivals import folds_of, predict
 from experiments.diagnose.experiment import diagnose_campaign
 from experiments.diagnose.fit.evidence import Hypothesis
@@ -27,7 +27,7 @@ from experiments.diagnose.report.document import COUNTS, _write_model, _write_ne
 from experiments.diagnose.report.gaps import Gaps
 from experiments.diagnose.report.sentences import behind_words
 from experiments.diagnose.report.summary import summary_sentences
-from experiments.diagnose.report.to_use import peak_sentences, use_sentences
+from experiments.diagnose.report.to_use import near_model_sentences, peak_sentences, use_sentences
 from experiments.diagnose.settings import DiagnoseSettings
 from rigid.series import read_series
 
@@ -269,7 +269,7 @@ def test_a_near_rival_has_a_model_of_its_own_and_a_far_one_has_none(diagnosed, t
     rival = found.choice.rivals[0]
     for evidence, left_out, written in ((5.9, 7.0, True), (5.9, 10.4, False), (12.0, None, False)):
         other = replace(rival, behind=evidence, behind_left_out=left_out)
-        one = replace(found, choice=replace(found.choice, rivals=(other,)))
+        one = replace(found, choice=replace(found.choice, rivals=(other,), table=()))
         rows = _write_near_models(tmp_path, one, nearest_each(one))
         assert bool(rows) is written
         files = [row["file"] for row in rows]
@@ -283,6 +283,28 @@ def test_a_near_rival_has_a_model_of_its_own_and_a_far_one_has_none(diagnosed, t
             stiffness = model.notes["fitted_by_diameter"]["0.06"]["stiffness"]
             again = settled(fit(rival.hypothesis.fit.model, rival.hypothesis.fit.values))
             assert stiffness == pytest.approx(again.values["stiffness@0.06"], rel=1e-6)
+
+
+def test_the_same_effect_in_another_form_has_a_model_where_evidence_does_not_exclude_it(diagnosed, tmp_path):
+    """F = K z (z / D)^0.3 is a power. The same power fitted as the quadratic is, 9 or 11 nats behind."""
+    *_, found = diagnosed
+    assert found.verdict == "named" and [form.id for form in found.forms] == ["depth-hardening:power"]
+    form = next(form for form in found.problem.forms if form.id == "depth-hardening:quadratic")
+    fitted = fit(found.best.model.with_forms([form]), found.best.values)
+    for behind, written in ((9.0, True), (11.0, False)):
+        other, worse = (Hypothesis(fitted, found.choice.best.score - behind - more) for more in (0.0, 0.5))
+        more = Hypothesis(replace(fitted, model=fitted.model.with_forms([*found.forms, form])), other.score)
+        table = (worse, more, found.choice.best, other)
+        one = replace(found, choice=replace(found.choice, rivals=(), table=table))
+        assert other_forms(one) == ([other] if written else [])  # one of each form, the likeliest
+        rows = _write_near_models(tmp_path, one, nearest_each(one))
+        file = "model-depth-hardening-quadratic.toml"
+        assert rows == ([{"effects": ["depth-hardening"], "forms": [form.id], "file": file}] if written else [])
+        said = near_model_sentences({"near_models": rows, "kind": "penetration"})
+        assert [file in sentence for sentence in said] == [True] * written
+    (effect,) = read_model(tmp_path / file).effect
+    assert effect.id == "depth-hardening" and "hardening_quadratic" in effect.parameters
+    assert other_forms(replace(one, verdict="unknown")) == []
 
 
 def test_a_model_below_every_measured_peak_is_told_with_by_how_much():

@@ -20,8 +20,9 @@ from scipy.integrate import solve_ivp
 from experiments.campaign import Recording
 from experiments.diagnose.core.diagnosis import diagnose
 from experiments.diagnose.fit.forms import load_own
-from experiments.diagnose.push.law import SLOTS, fall, given_way, push, slot_places, slot_table
+from experiments.diagnose.push.law import fall, given_way, push
 from experiments.diagnose.push.problem import make_problem
+from experiments.diagnose.push.slots import SLOTS, slot_places, slot_table
 
 C_RELAX, SOON, B = 0.04, 0.1, 8.0
 
