@@ -181,7 +181,7 @@ def _curves(settings: CalibrateSettings, responses: Surfaces, best: Values, fold
     return files
 
 
-def _measured(entry: Json) -> str:
+def _simulated(entry: Json) -> str:
     error = "" if entry["error"] is None else f" ± {entry['error']:.2g}"
     return "-" if entry["measured"] is None else f"{entry['measured']:.4g}{error}"
 
@@ -189,7 +189,7 @@ def _measured(entry: Json) -> str:
 _FIGURES: dict[str, Callable[[Json], str]] = {
     "figure": lambda entry: entry["name"] + (f" ({entry['plane']})" if entry["plane"] not in (None, "shear") else ""),
     "wanted": lambda entry: f"{entry['wanted']:g} ± {entry['tolerance']:g} {entry['unit']}",
-    "measured": _measured,
+    "simulated": _simulated,
     "surface": lambda entry: (
         "-" if entry["expected"] is None else f"{entry['expected']:.4g} ± {entry['expected_std']:.2g}"
     ),

@@ -101,7 +101,7 @@ def _residuals(report: Report) -> Block:
         colour = BED if entry["fitted"] else GREY
         axis.errorbar([off], [k], xerr=[2 * error], color=colour, marker="o" if entry["fitted"] else "s", ls="")
     axis.set_yticks(range(len(entries)), [_axis_words(entry).split(" [")[0] for entry in reversed(entries)])
-    axis.set(ylim=(-0.6, len(entries) - 0.4), xlabel="measured less wanted [tolerances]")
+    axis.set(ylim=(-0.6, len(entries) - 0.4), xlabel="simulated less wanted [tolerances]")
     reach = max(1.6, *(abs(x) for x in axis.get_xlim()))
     axis.set_xlim(-reach, reach)
     handles = [

@@ -67,7 +67,7 @@ _LONG = 0.25
 _SLAB = """up to four diameters behind the mid-plane of the body, the farther the darker; dashed: the undisturbed \
 surface"""
 """In the small print of a picture with OpenGL, and of one without."""
-_GIF_LIMIT = 5_500_000  # bytes
+_GIF_LIMIT = 4_000_000  # bytes
 _KEPT = tuple(ImageColor.getrgb(colour)[:3] for colour in ("#ffffff", *STATES.values(), str(FORCE["color"])))
 """Colours that no film may change for one near it, as rare as they are: a legend's would come out alike."""
 _ROOM = 256 - len(_KEPT)

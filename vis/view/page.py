@@ -22,7 +22,7 @@ from vis.view.sources import Source, sources_of
 __all__ = ["IN_REPORT", "report_scene", "write_view"]
 
 say = Sentences(__package__)
-IN_REPORT = Limits(size=6e6, frames=40, half=True)
+IN_REPORT = Limits(size=5e6, frames=40, half=True)
 """Of all scenes of a report together: with its pictures it stays far below 15 MB."""
 _FRAMES = 240
 _RUNS = 3

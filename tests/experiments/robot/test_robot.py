@@ -129,7 +129,7 @@ def test_feet_are_regions_of_lammps_where_joints_hold_them_in_the_plane(given, h
     run = RobotOnBed(settings, plan_robot(settings))
     run.progress = None
     run.ground(grain_bed())
-    assert made == {"free": not held}
+    assert made == {"free": not held, "kept": None}
 
 
 def test_the_depth_of_a_bed_that_a_refusal_names_is_accepted():
