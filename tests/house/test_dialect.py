@@ -78,3 +78,24 @@ def test_a_word_of_the_dialect_counts_in_a_message_or_in_a_docstring():
     source = '"""It\ntells."""\nraise ValueError(f"{size} m would do", "tell")\n'
     assert found_in(strings_of(source)) == [3]
     assert found_in(docstrings_of(source)) == [2]
+
+
+def prose_of(text: str) -> str:
+    """The text of a page without code blocks and tables."""
+    return re.sub(r"^\s*\|.*$", "", re.sub(r"```.*?```", "", text, flags=re.S), flags=re.M)
+
+
+def test_pages_have_few_words_of_the_dialect_short_sentences_and_keep_to_their_bounds():
+    """Without the notebook, kept results and the page of validation, which is made by code: 30,000 words in all."""
+    docs = [
+        path.read_text("utf-8")
+        for path in sorted((ROOT / "docs").rglob("*.md"))
+        if not {"results", "notes"} & set(path.relative_to(ROOT).parts) and path.name != "validation.md"
+    ]
+    readme = (ROOT / "README.md").read_text("utf-8")
+    assert len(readme.split()) <= 700 and 20_000 < sum(len(page.split()) for page in docs) <= 30_000
+    prose = "\n".join(map(prose_of, [readme, *docs]))
+    assert len(prose.split()) > 20_000
+    assert 1000 * len(DIALECT.findall(prose)) / len(prose.split()) <= MOST_PER_1000, DIALECT.findall(prose)
+    lengths = [len(one.split()) for one in re.split(r"(?<=[.!?:])\s+", prose) if len(one.split()) > 3]
+    assert sum(lengths) / len(lengths) < 18
