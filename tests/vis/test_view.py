@@ -15,6 +15,7 @@ from dem import Bed
 from experiments.cli.main import BAD_INPUT, DONE, main
 from vis.page.answer import write_page
 from vis.page.page import Page, Section
+from vis.pictures import render
 from vis.pictures.canvas import colour_values
 from vis.pictures.frames import FrameWriter, read_frames
 from vis.view.curves import of_tumble
@@ -181,6 +182,8 @@ def test_a_report_holds_the_small_scene_with_its_script_once(make_run, tmp_path)
     text = page.read_text()
     assert text.count("class Viewer") == 1 and len(HEAD.findall(text)) == 2
     assert page.stat().st_size < 15e6
+    # Scenes, a film in base64, and the 4 MB of figures and stills of a spike's run stay below 15 MB.
+    assert IN_REPORT.size + 4 / 3 * render._GIF_LIMIT + 4e6 < 15e6
     empty = write_page(tmp_path / "other.html", Page("t", [], [Section("", [])]), {})
     assert "class Viewer" not in empty.read_text()
 
