@@ -31,6 +31,7 @@ from . import say
 from .bearing import STICKING, resistance_of
 from .bed_progress import BedProgress
 from .following import CHECKPOINT, Followed, Run
+from .lammps import in_lammps
 from .recipes import recipe_of
 from .settings import GrainsSettings
 from .sizes import carried_height, expected_grain_count
@@ -38,7 +39,7 @@ from .softening import Softening, check_young, run_limit, soften_material
 from .staged import staged_bed
 from .where import check_where
 
-__all__ = ["MARGIN", "RAIN", "TOUCH", "Forecast", "PlatformOnBed"]
+__all__ = ["MARGIN", "RAIN", "Forecast", "PlatformOnBed"]
 
 MARGIN = 3.0  # Sand beyond the outermost footprint, over a spike's diameter [1]
 RAIN = 2.5  # Height of the loose column that a bed is rained from, over the bed's depth [1]
@@ -74,6 +75,8 @@ class PlatformOnBed(Followed[Run], Generic[Settings, Run, Expected]):
     gravity: float  # Gravity of the platform [m/s2]
     counterweight: float  # Of the rig [kg]; 0 in flight
     weight: float  # On the surface [N]
+    progress: Progress  # Set by `announce`
+    turns_freely = False  # Whether it turns about any axis, not about y alone
     copies = 1.0  # Members side by side in the platform for one on the bed [1]
     spike_diameter: float  # [m]
     reach: float  # From the centre to the farthest tip [m]
@@ -236,12 +239,17 @@ class PlatformOnBed(Followed[Run], Generic[Settings, Run, Expected]):
         return bed.repeated(self.repeats, height=top) if self.repeats > 1 or top > bed.height else bed
 
     def ground(self, bed: Bed) -> BedGround:
-        """The platform on the prepared bed."""
-        s, copies = self.settings, self.copies
-        return BedGround(
-            bed, self.members(), copies=copies, touch=TOUCH * self.weight / copies, friction=s.spike_friction,
-            restitution=s.spike_restitution, **self.layout(bed),
-        )  # fmt: skip
+        """The platform on the prepared bed; its grains are in LAMMPS if the settings say so."""
+        s: Any = self.settings
+        copies = self.copies
+        options: Json = {
+            "copies": copies, "touch": TOUCH * self.weight / copies, "friction": s.spike_friction,
+            "restitution": s.spike_restitution, **self.layout(bed),
+        }  # fmt: skip
+        if s.ground != "lammps":
+            return BedGround(bed, self.members(), **options)
+        bed.overlap_limit = run_limit(s.max_overlap)
+        return in_lammps(bed, self.members(), s, self.progress, free=self.turns_freely, kept=self.kept, **options)
 
     def stepper(self, bed: Bed) -> Run:
         """The run on the prepared bed, with its bound on overlaps and, with `sleep`, its rules of sleep."""

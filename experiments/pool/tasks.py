@@ -158,8 +158,7 @@ def _run_before(task: Task, tell: Callable[[str], None]) -> Outcome | None:
         text = (task.path / "result.json").read_text(encoding="utf-8")
     except (OSError, ValueError) as error:
         if task.path.is_dir():
-            said = file_words(error, f"a file below {task.path}") if isinstance(error, OSError) else str(error)
-            tell(f"{said}; the run is done again")
+            tell(f"{_said(error, task)}; the run is done again")
         return None
     return Outcome(task.name, text, processor_time=folder.processor_time)
 
@@ -182,8 +181,12 @@ def carry_out(task: Task, tell: Tell, shown: Progress | None = None) -> Outcome:
         if task.path.is_dir():
             with suppress(OSError):
                 write_text(task.path / "traceback.txt", traceback.format_exc())
-        said = file_words(error, f"a file below {task.path}") if isinstance(error, OSError) else str(error)
-        return Outcome(task.name, fault=" ".join(f"{type(error).__name__}: {said}".split()))
+        return Outcome(task.name, fault=" ".join(f"{type(error).__name__}: {_said(error, task)}".split()))
+
+
+def _said(error: Exception, task: Task) -> str:
+    """What went wrong, with the file where one could not be read or written."""
+    return file_words(error, f"a file below {task.path}") if isinstance(error, OSError) else str(error)
 
 
 def _with_after(task: Task, tell: Tell, shown: Progress | None) -> Outcome:

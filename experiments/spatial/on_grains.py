@@ -17,9 +17,9 @@ from coupling import BedGround, LawGround, SpatialRun, spatial_members
 from coupling.members import Member
 from dem import Bed
 from experiments.grains.following import Followed
-from experiments.grains.lammps import check_lammps, in_lammps
-from experiments.grains.on_bed import MARGIN, TOUCH, Forecast, PlatformOnBed
-from experiments.grains.softening import PUSHED, run_limit
+from experiments.grains.lammps import check_lammps
+from experiments.grains.on_bed import MARGIN, Forecast, PlatformOnBed
+from experiments.grains.softening import PUSHED
 from experiments.platform.settled import check_lengths
 from experiments.runs.progress import Progress
 from experiments.runs.result import Result
@@ -109,6 +109,8 @@ class SpatialForecast(Forecast):
 class SpatialOnBed(SpatialFollowed, PlatformOnBed[SpatialSettings, SpatialRun, SpatialForecast]):
     """A platform in space on a bed."""
 
+    turns_freely = True
+
     def __init__(self, settings: SpatialSettings, plan: SpatialPlan) -> None:
         super().__init__(settings, plan)
         platform = self.platform
@@ -136,17 +138,6 @@ class SpatialOnBed(SpatialFollowed, PlatformOnBed[SpatialSettings, SpatialRun, S
             run=run, low=(float(low[0]), float(low[1])), high=(float(high[0]), float(high[1])),
             deepest=max(float(-places[..., 2].min()), 0.0),
             fastest=float(np.linalg.norm(speeds[near], axis=1).max()), rise=float(rows["z"].max() - rows["z"][0]),
-        )  # fmt: skip
-
-    def ground(self, bed: Bed) -> BedGround:
-        """The platform on the prepared bed; its grains are in LAMMPS if the settings say so."""
-        s = self.settings
-        if s.ground != "lammps":
-            return super().ground(bed)
-        bed.overlap_limit = run_limit(s.max_overlap)
-        return in_lammps(
-            bed, self.members(), s, self.progress, free=True, touch=TOUCH * self.weight, friction=s.spike_friction,
-            restitution=s.spike_restitution, kept=self.kept, **self.layout(bed),
         )  # fmt: skip
 
     def check(self) -> None:

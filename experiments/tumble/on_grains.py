@@ -18,9 +18,9 @@ from coupling.members import FEWEST_SLOTS, Member, slots_of
 from dem import Bed, Graded
 from experiments.grains.flight import lies_in_flight
 from experiments.grains.graded import graded_under
-from experiments.grains.lammps import check_lammps, in_lammps
-from experiments.grains.on_bed import MARGIN, TOUCH, Forecast, PlatformOnBed
-from experiments.grains.softening import PUSHED, Softening, run_limit
+from experiments.grains.lammps import check_lammps
+from experiments.grains.on_bed import MARGIN, Forecast, PlatformOnBed
+from experiments.grains.softening import PUSHED, Softening
 from experiments.grains.staged import check_bed_stages
 from experiments.platform.numbers import platform_numbers, tip_angles, tip_depth, torque_within_limit
 from experiments.platform.settled import check_lengths
@@ -307,17 +307,6 @@ class PlanarOnBed(PlatformOnBed[TumbleSettings, CoupledTumble, PlanarForecast]):
 
     def layout(self, bed: Bed) -> Mapping[str, Any]:
         return {"origin": (self.origin, 0.5 * bed.size[1]), "begin": self.settings.place}
-
-    def ground(self, bed: Bed) -> BedGround:
-        """The platform on the prepared bed; its grains are in LAMMPS if the settings say so."""
-        s = self.settings
-        if s.ground != "lammps":
-            return super().ground(bed)
-        bed.overlap_limit = run_limit(s.max_overlap)
-        return in_lammps(
-            bed, self.members(), s, self.progress, copies=self.copies, touch=TOUCH * self.weight / self.copies,
-            friction=s.spike_friction, restitution=s.spike_restitution, kept=self.kept, **self.layout(bed),
-        )  # fmt: skip
 
     def check(self) -> None:
         """As `PlatformOnBed.check`; also checks LAMMPS if it is requested."""
