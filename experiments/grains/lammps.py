@@ -9,6 +9,7 @@ from . import say
 
 if TYPE_CHECKING:
     from coupling import BedGround
+    from dem import Material
     from experiments.runs.progress import Progress
     from rigid.ground.reaction import State
 
@@ -45,13 +46,15 @@ def cone_note(settings: Any) -> str | None:
     return say("cone_in_lammps", nearer=radius * (1 - NEARER), wider=radius * (WIDER - 1))
 
 
-def check_lammps(settings: Any) -> None:
-    """Raise ValueError if grains are to be in LAMMPS and it does not start on `ranks`, or these are too many."""
-    from coupling.lammps import LammpsMissingError, check_ranks
+def check_lammps(settings: Any, material: "Material") -> None:
+    """Raise ValueError if grains of a material are to be in LAMMPS and it does not start on `ranks`, these are too
+    many, or it refuses their cohesion."""
+    from coupling.lammps import LammpsMissingError, check_cohesion, check_ranks
 
     if settings.ground == "lammps":
         try:
             check_ranks(settings.ranks or 1)
+            check_cohesion(material.cohesion)
         except LammpsMissingError as error:
             raise ValueError(f"ground = 'lammps': {error}") from None
 

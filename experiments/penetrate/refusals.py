@@ -39,8 +39,8 @@ def check(settings: PenetrateSettings) -> None:
     if not settings.on_grains:
         _check_steps_on_law(settings, fitted_ground(settings.ground))
         return
-    check_lammps(settings)
     stuff = beds.find_material(settings)
+    check_lammps(settings, stuff)
     if settings.bed_stages is not None:
         size, grain, spread = settings.bed_size, settings.grain, settings.spread
         check_bed_stages(settings.bed_stages, stuff, size=size, grain=grain, spread=spread)

@@ -327,7 +327,7 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
         s = self.settings
         if s.settle_gravity is not None and s.settle_gravity < self.gravity:
             raise ValueError(say("settle_below", s=s, gravity=self.gravity))
-        check_lammps(s)
+        check_lammps(s, self.material)
         for foot in self._robot.feet:
             if not foot.shapes:
                 raise ValueError(say("site_on_grains", name=foot.name))

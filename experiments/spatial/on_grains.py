@@ -142,7 +142,7 @@ class SpatialOnBed(SpatialFollowed, PlatformOnBed[SpatialSettings, SpatialRun, S
 
     def check(self) -> None:
         """Raise ValueError, naming key, value and what is accepted, for a bed that does not suit this trial."""
-        check_lammps(self.settings)
+        check_lammps(self.settings, self.material)
         check_lengths(self.settings, self.platform.stance().spike_length)
         try:
             super().check()

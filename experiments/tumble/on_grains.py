@@ -310,7 +310,7 @@ class PlanarOnBed(PlatformOnBed[TumbleSettings, CoupledTumble, PlanarForecast]):
 
     def check(self) -> None:
         """As `PlatformOnBed.check`; also checks LAMMPS if it is requested."""
-        check_lammps(self.settings)
+        check_lammps(self.settings, self.material)
         super().check()
 
     def run_on(self, ground: BedGround) -> CoupledTumble:

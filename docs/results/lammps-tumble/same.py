@@ -24,7 +24,7 @@ from experiments import tumble
 from experiments.tumble.on_grains import PlanarOnBed
 from experiments.tumble.settings import TumbleSettings
 
-TIME = 8e-3
+TIME, RANKS = 8e-3, 2
 ROWS: list[tuple[float, ...]] = []
 
 
@@ -43,23 +43,34 @@ def fresh(bed: Any) -> Bed:
     return made
 
 
-def follow(seed: int, kind: str, given: dict[str, Any]) -> np.ndarray:
-    """The rows of one run."""
-    ROWS.clear()
+def from_fresh_grains(ranks: int) -> None:
+    """Let every tumble begin from grains without history, on our bed and in LAMMPS on `ranks` processes."""
+    own_ground = PlanarOnBed.ground
+    PlanarOnBed.ground = lambda self, bed: own_ground(self, fresh(bed) if self.settings.ground == "bed" else bed)
+    lammps.moved_to_lammps = lambda bed, settings, progress, **_: LammpsBed(fresh(bed), ranks=ranks)
+
+
+def settings_of(seed: int, kind: str, given: dict[str, Any], ranks: int) -> TumbleSettings:
+    """The settings of a run on our bed ("bed") or in LAMMPS ("lammps")."""
     own: dict[str, Any] = {"ground": kind, "seed": seed, "frame_count": 0, "threads": 1}
     known = {
         key: tuple(value) if isinstance(value, list) else value
         for key, value in given.items() if key in TumbleSettings.model_fields and key != "ranks"
     }  # fmt: skip
-    ranks = {"ranks": 2} if kind == "lammps" else {}
+    return TumbleSettings(**known | own | ({"ranks": ranks} if kind == "lammps" else {}))
+
+
+def follow(seed: int, kind: str, given: dict[str, Any]) -> np.ndarray:
+    """The rows of one run."""
+    ROWS.clear()
     with suppress(EnoughError):
-        tumble.run(TumbleSettings(**known | own | ranks), Path(tempfile.mkdtemp()) / "run")
+        tumble.run(settings_of(seed, kind, given, RANKS), Path(tempfile.mkdtemp()) / "run")
     return np.array(ROWS)
 
 
 def main(out: Path, given: dict[str, Any], seeds: list[int]) -> None:
     """Run both for each seed."""
-    own_lower, own_ground = CoupledTumble._lower, PlanarOnBed.ground
+    own_lower = CoupledTumble._lower
 
     def lower(self: CoupledTumble, reaction: Any) -> None:
         ROWS.append((float(self.body.time), *map(float, reaction.force), float(self.body.pose.position[2])))
@@ -69,8 +80,7 @@ def main(out: Path, given: dict[str, Any], seeds: list[int]) -> None:
         own_lower(self, reaction)
 
     CoupledTumble._lower = lower
-    PlanarOnBed.ground = lambda self, bed: own_ground(self, fresh(bed) if self.settings.ground == "bed" else bed)
-    lammps.moved_to_lammps = lambda bed, settings, progress, *, begin=0.0: LammpsBed(fresh(bed), ranks=2)
+    from_fresh_grains(RANKS)
     for seed in seeds:
         bed, other = (follow(seed, kind, given) for kind in ("bed", "lammps"))
         first, end = int(np.argmax(bed[:, 3] > 0)), min(len(bed), len(other))

