@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dem.shown import html_of
 from hedgebed_renamed import renamed
 from rigid.result import Result, quantities_of, toml_value, write_text
 from rigid.series import read_series, write_series
@@ -141,6 +142,10 @@ class Penetration:
         if self.kind == "drop" and self.stop_time is not None:
             values["stop_time"] = (self.stop_time, "s", "")
         return quantities_of(values, std=None)
+
+    def _repr_html_(self) -> str | None:
+        """What a notebook shows for a run that is the last line of a cell."""
+        return html_of("run", self)
 
     def save(self, folder: str | Path) -> Path:
         """Write a run folder: run.toml, result.json and the series; returns it (`vis.write_report` makes the report).

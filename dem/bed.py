@@ -13,6 +13,7 @@ from .grains.materials import Material
 from .prepare.bedfile import load_prepared
 from .prepare.prepare import prepare_as, prepare_bed
 from .prepare.report import Prepared
+from .shown import html_of
 
 __all__ = ["Bed", "BedFailure"]
 
@@ -52,6 +53,10 @@ class Bed(BedCore):
     def load_prepared(cls, path: str | Path, *, arch: str = "cpu", threads: int | None = None) -> Prepared[Self]:
         """A bed from a file, with its recipe and reports. Raises ValueError: as ``Bed.load``."""
         return load_prepared(path, arch=arch, threads=threads, make=cls)
+
+    def _repr_html_(self) -> str | None:
+        """What a notebook shows for a bed that is the last line of a cell."""
+        return html_of("bed", self)
 
     hold = renamed("hold", "checkpoint")
     take_back = renamed("take_back", "rollback")

@@ -5,15 +5,13 @@ picture can thus be made again, elsewhere, years later. The modules:
 
 `vis.pictures.frames` (VTU and PVD), `vis.pictures.meshes` (triangle meshes), `vis.pictures.pictures` (off-screen
 pictures and the animation), `vis.report` (`report.html`). What scripts want most can be had from `vis` itself, and is
-loaded when it is first asked for: frames are written without matplotlib. In a notebook, `import vis` makes a `dem.Bed`
-that is the last line of a cell show itself.
+loaded when it is first asked for: frames are written without matplotlib.
 
 Imports `rigid`.
 """
 
 from __future__ import annotations
 
-import sys
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -38,15 +36,3 @@ def __getattr__(name: str) -> Any:
 
 def __dir__() -> list[str]:
     return sorted({*globals(), *__all__})
-
-
-def _show_beds() -> None:
-    """Show a bed in a notebook, where one runs: a bed itself draws nothing, as `dem` does not know of pictures."""
-    ipython = sys.modules.get("IPython")
-    shell = None if ipython is None else ipython.get_ipython()
-    if shell is not None:
-        of_html = shell.display_formatter.formatters["text/html"]
-        of_html.for_type_by_name("dem.bed", "Bed", lambda bed: import_module("vis.view.notebook").html_of_bed(bed))
-
-
-_show_beds()

@@ -47,8 +47,10 @@ def cone_note(settings: Any) -> str | None:
 
 
 def check_lammps(settings: Any, material: "Material") -> None:
-    """Raise ValueError if grains of a material are to be in LAMMPS and it does not start on `ranks`, these are too
-    many, or it refuses their cohesion."""
+    """Raise ValueError if grains are to be in LAMMPS and it does not start on `ranks`, or these are too many.
+
+    Also where it refuses the cohesion of ``material``.
+    """
     from coupling.lammps import LammpsMissingError, check_cohesion, check_ranks
 
     if settings.ground == "lammps":

@@ -1,18 +1,23 @@
 """A run as a page: it holds the run's numbers, needs no network, keeps to its limit and says what it leaves out."""
 
+import html
 import json
 import re
 import subprocess
 import sys
 import time
+from importlib.metadata import entry_points
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from import_graph import ROOT
 
 from benchmarks.view import bed_of
+from coupling import drive
 from dem import Bed
 from experiments.cli.main import BAD_INPUT, DONE, main
+from rigid import Spike, SpringDamper
 from vis.page.answer import write_page
 from vis.page.page import Page, Section
 from vis.pictures import render
@@ -212,14 +217,11 @@ def test_the_command_writes_the_page_and_refuses_what_it_cannot_show(make_run, t
 
 
 def test_a_notebook_shows_a_run_or_a_bed_in_a_frame_of_its_own(make_run, tmp_path):
-    from html import unescape
-    from types import SimpleNamespace
-
     from vis import View
 
     shown = View(make_run(tmp_path / "run", frames=1))._repr_html_()
     source = re.fullmatch(r'<iframe srcdoc="([^"]*)" .*sandbox="allow-scripts".*></iframe>', shown)[1]
-    assert len(DATA.findall(unescape(source))) == 3
+    assert len(DATA.findall(html.unescape(source))) == 3
     arrays = {"position": np.random.default_rng(1).random((30, 3)), "radius": np.full(30, 0.01), "id": np.arange(30)}
     bed = SimpleNamespace(time=0.5, grains=lambda: SimpleNamespace(as_dict=lambda: arrays))
     scenes, _ = decoded(View(bed).save(tmp_path / "bed.html"))
@@ -228,23 +230,23 @@ def test_a_notebook_shows_a_run_or_a_bed_in_a_frame_of_its_own(make_run, tmp_pat
         View([1, 2])
 
 
-def test_a_bed_as_the_last_line_of_a_cell_shows_itself_once_vis_is_imported(monkeypatch):
-    """As IPython has it: a formatter of text/html for a class by the name of its module and its own, found later."""
-    from types import SimpleNamespace
-
-    import vis
-
-    known = {}
-    html = SimpleNamespace(for_type_by_name=lambda module, name, show: known.update({(module, name): show}))
-    shell = SimpleNamespace(display_formatter=SimpleNamespace(formatters={"text/html": html}))
-    for running in (None, shell):
-        monkeypatch.setitem(sys.modules, "IPython", SimpleNamespace(get_ipython=lambda running=running: running))
-        vis._show_beds()
-    ((place, show),) = known.items()
-    assert place == (Bed.__module__, Bed.__name__)
+def test_a_bed_as_the_last_line_of_a_cell_shows_itself(monkeypatch):
+    """The package that draws is found by its entry point, without an import of it."""
+    (drawer,) = entry_points(group="hedgebed.html", name="bed")
+    assert drawer.value == "vis.view.notebook:html_of_bed"
     arrays = {"position": np.random.default_rng(1).random((30, 3)), "radius": np.full(30, 0.01), "id": np.arange(30)}
     bed = SimpleNamespace(time=0.5, grains=lambda: SimpleNamespace(as_dict=lambda: arrays))
-    assert show(bed).startswith("<iframe")
+    assert Bed._repr_html_(bed).startswith("<iframe")
+    monkeypatch.setattr("dem.shown.entry_points", lambda **which: ())
+    assert Bed._repr_html_(bed) is None  # without a package that draws, a notebook shows the text
+
+
+def test_a_run_of_a_script_as_the_last_line_of_a_cell_shows_its_curve():
+    run = drive(Spike(diameter=0.02), into=SpringDamper(stiffness=1e3, damping=1.0), speed=0.1, depth=0.005)
+    shown = html.unescape(run._repr_html_())
+    labels = [panel["label"] for panel in json.loads(HEAD.search(shown)[1])["scenes"][0]["panels"]]
+    assert shown.startswith("<iframe") and [label.split()[0] for label in labels] == ["depth", "force", "velocity"]
+    assert "surface: " not in shown.split("<body>")[1].split('class="head"')[0]  # what stands there is a height
 
 
 def test_a_run_that_goes_on_is_shown_again_until_it_ends(make_run, tmp_path, monkeypatch):

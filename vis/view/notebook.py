@@ -11,7 +11,7 @@ from typing import Any
 from vis.pictures.frames import GRAIN_FIELDS, FrameWriter
 from vis.view.page import write_view
 
-__all__ = ["View", "html_of_bed"]
+__all__ = ["View", "html_of_bed", "html_of_run"]
 
 _UNASKED = 6e6
 """Most bytes of the data of a bed that a notebook shows by itself."""
@@ -51,6 +51,12 @@ class View:
 def html_of_bed(bed: Any) -> str:
     """The frame of a bed that is the last line of a cell."""
     return View(bed, size=_UNASKED)._repr_html_()
+
+
+def html_of_run(run: Any) -> str:
+    """The frame of a run of a script, as `coupling.Penetration`, that is the last line of a cell."""
+    with tempfile.TemporaryDirectory() as scratch:
+        return View(run.save(Path(scratch) / "run"), size=_UNASKED)._repr_html_()
 
 
 def _write_bed(bed: Any, home: Path) -> None:

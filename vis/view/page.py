@@ -118,8 +118,9 @@ def _title(home: Path) -> tuple[str, list[str]]:
     settings = {setting.key: setting.value.strip("\"'") for setting in run.settings}
     title = with_squares(str(result.get("title") or f"Run in {home.resolve().name}"))
     lead = [f"hedgebed {result['version']}"] if "version" in result else []
-    surface = result.get("surface") or settings.get("material") or settings.get("surface")
-    lead += [str(result.get("experiment") or "no result yet"), *([f"surface: {surface}"] if surface else [])]
+    surface = str(result.get("surface") or settings.get("material") or settings.get("surface") or "")
+    named = bool(surface) and not surface[0].isdigit() and surface[0] != "-"  # The run of a script states a height [m]
+    lead += [str(result.get("experiment") or "no result yet"), *([f"surface: {surface}"] if named else [])]
     lead += [f"folder: {home.resolve().name}", *([f"status: {run.status}"] if run.status != "done" else [])]
     return title, lead
 
