@@ -55,11 +55,11 @@ def test_limits_and_readme_state_the_angle_among_real_grains_of_the_kept_runs(va
     assert f"{angle:.0f} ± {half:.0f} degrees, {deepest:.0f} ± {around:.0f} mm" in limits
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
     five, three = (interval_of(values("angle_deg", grain)) for grain in (2.4, 1.6))
-    said = re.search(r"it (\d+) ± (\d+) degrees \*downwards\* on 2.4 mm grains, ([\d.]+) ± ([\d.]+) on 1.6 mm", readme)
+    said = re.search(r"\*downwards\*, (\d+) ± (\d+) degrees on 2.4 mm grains, ([\d.]+) ± ([\d.]+) on 1.6 mm", readme)
     assert [float(one) for one in said.groups()] == [
         round(-five.mean), round(five.half), pytest.approx(-three.mean, abs=0.051), pytest.approx(three.half, abs=0.051)
     ]  # fmt: skip
-    assert f"to 0.2 mm {-angle:.0f} ± {half:.0f}" in readme
+    assert f"to 0.2 mm: {-angle:.0f} ± {half:.0f}" in readme
 
 
 @pytest.mark.parametrize(
