@@ -26,8 +26,8 @@ for command in sys.argv[2:]:
     assert code == 0, (command, code)
 """
 BASE = (
-    "penetrate --tip-diameter 0.012 --grain 0.004 --allow-coarse --bed-size 0.048 0.048 0.03 --depth 0.004 --seeds 1"
-    " --speeds 0.4 --drop-speeds 0.2 --frame-count 0 --threads 1 --max-overlap 0.1 --out runs/bed",
+    "penetrate --tip-diameter 0.012 --grain 0.004 --allow-coarse --bed-size 0.048 0.048 0.03 --depth 0.004 --seeds 1 2"
+    " --speeds 0.2 0.4 --drop-speeds 0.2 --frame-count 0 --threads 1 --max-overlap 0.1 --out runs/bed",
     "tumble --out runs/tumble",
     "hop --out runs/hop",
     "campaign new mine --kind penetration",
@@ -37,7 +37,14 @@ BASE = (
     "experiments list",
     "effects",
     "bed foot sand cylinder --size 16mm --load 0.5N",
+    "ground --gravity 1e-3g --tip-diameter 12mm --out runs/ground",
+    "tumble --torque 0.15 --out runs/other",
+    "compare runs/tumble runs/other --out runs/beside",
+    "calibrate runs/bed --out runs/laws",
+    "paper --rigs 0.0085 --surfaces steel brick --torque-rise 0 --no-evidence --out runs/paper",
+    "sweep sweep.toml --workers 1 --out runs/sweep",
 )
+SWEEP = 'experiment = "tumble"\n[fixed]\nsurface = "brick"\n[over]\nmu_s = [0.4, 0.5]\n'
 
 
 def run(*words: str, cwd: Path, **environment: str) -> str:
@@ -85,8 +92,10 @@ def test_the_wheel_has_every_data_file_and_only_the_documented_top_level_names(w
 
 
 def test_the_commands_work_from_the_wheel_in_another_folder(site, tmp_path):
+    (tmp_path / "sweep.toml").write_text(SWEEP, encoding="utf-8")
     out = run(sys.executable, "-c", COMMANDS, str(site), *BASE, cwd=tmp_path, PYTHONPATH=str(site))
-    assert {path.parent.name for path in tmp_path.glob("runs/*/report.html")} >= {"bed", "tumble", "hop", "diagnosis"}
+    reports = {path.parent.name for path in tmp_path.glob("runs/*/report.html")}
+    assert reports >= {"bed", "tumble", "hop", "diagnosis", "ground", "beside", "laws", "paper", "sweep"}
     assert "stiffness" in out
 
 
