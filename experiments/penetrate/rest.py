@@ -19,7 +19,6 @@ from experiments.grains.footing import cohesion_in_95, enough_cohesion, footing_
 from experiments.runs.types import Json
 from rigid.platform.rig import STANDARD_GRAVITY
 from vis.penetrate.summary import REAL_GRAINS
-from vis.penetrate.summary_parts import joined
 
 from . import beds
 from .findings import Findings
@@ -65,8 +64,9 @@ def answer(findings: Findings, material: Any) -> Json | None:
     told: Json = {
         "s": settings, "depth": _length(depths[0]), "foot": 1e3 * settings.foot, "floor": 1e3 * settings.bed_size[2],
         "plate": _length(depths[1]), "formula": _lengths(*formula), "angle": angles[0],
-        "angles": _ends(*angles), "enough": _ends(*reversed(enough), digits=2), "g": settings.gravity / STANDARD_GRAVITY,
-        "driven": 1e3 * settings.depth, "of_k": "the fitted K" if findings.fit.stiffness > 0 else "the expected K",
+        "angles": _ends(*angles), "enough": _ends(*reversed(enough), digits=2),
+        "g": settings.gravity / STANDARD_GRAVITY, "driven": 1e3 * settings.depth,
+        "of_k": "the fitted K" if findings.fit.stiffness > 0 else "the expected K",
         "body": say("body_first"),
     }  # fmt: skip
     beside = _beside(settings) if material.cohesion == "none" else None
@@ -253,5 +253,6 @@ def _ends(*values: float, digits: int = 3) -> str:
 
 
 def _listed(values: Sequence[float], *, digits: int = 3) -> str:
-    """Some numbers: "54, 35 and 7.2"."""
-    return joined([f"{value:.{digits}g}" for value in values])
+    """Some numbers: "54, 35 or 7.2"."""
+    texts = [f"{value:.{digits}g}" for value in values]
+    return texts[0] if len(texts) == 1 else f"{', '.join(texts[:-1])} or {texts[-1]}"
