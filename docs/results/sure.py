@@ -1,8 +1,8 @@
 """Give kept results of `penetrate` their 95 % intervals: python docs/results/sure.py FOLDER...
 
 Each FOLDER has the run.toml and result.json of a finished `hedgebed penetrate`. `sure` and `rest`, the depth at rest of
-a foot that this bed cannot show, are made again from the numbers that are kept (fits of the beds, moments and peaks of the runs, depths at rest): no run is
-repeated. Then delete the line of result.json in cost.json and run digests.py.
+a foot that this bed cannot show, are made again from the numbers that are kept (fits of the beds, moments and peaks of
+the runs, depths at rest): no run is repeated. Then delete the line of result.json in cost.json and run digests.py.
 """
 
 import json

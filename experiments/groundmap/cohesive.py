@@ -19,7 +19,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from dem.grains.materials import MATERIALS
-from experiments.grains.footing import Cohesion, cohesion_in_95, footing_depths
+from experiments.grains.bearing import Cohesion, cohesion_in_95, footing_depths
 from vis.page.numbers import between, foldable
 
 from .answers import SLACK, Answer, Number, asked_of, check_depth, times

@@ -14,8 +14,17 @@ from dataclasses import asdict
 from typing import Any
 
 from dem.grains.materials import MATERIALS
-from experiments.grains.bearing import COHESIONS, UNSURE, bearing_capacity, bearing_of, strength
-from experiments.grains.footing import cohesion_in_95, enough_cohesion, footing_angles, footing_depths
+from experiments.grains.bearing import (
+    COHESIONS,
+    UNSURE,
+    bearing_capacity,
+    bearing_of,
+    cohesion_in_95,
+    enough_cohesion,
+    footing_angles,
+    footing_depths,
+    strength,
+)
 from experiments.runs.types import Json
 from rigid.platform.rig import STANDARD_GRAVITY
 from vis.penetrate.summary import REAL_GRAINS

@@ -5,8 +5,7 @@ import math
 import pytest
 
 from dem.grains.materials import MATERIALS, Material
-from experiments.grains.bearing import friction_angle
-from experiments.grains.footing import cohesion_in_95, enough_cohesion, footing_angles, footing_depths
+from experiments.grains.bearing import cohesion_in_95, enough_cohesion, footing_angles, footing_depths, friction_angle
 
 G = 9.80665
 PRESSURE = 0.5 / (math.pi * 0.008**2)  # 0.5 N on 16 mm
