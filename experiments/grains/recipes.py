@@ -1,9 +1,11 @@
 """Default preparation of a bed of each material, what is known of its strength, how densely it rains: recipes.toml."""
 
 import tomllib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 from dem.grains.materials import Material
 
@@ -33,10 +35,12 @@ class Recipe:
 @cache
 def _recipes() -> dict[str, Recipe]:
     tables = tomllib.loads(_FILE.read_text(encoding="utf-8"))
-    return {
-        name: Recipe(**{key: tuple(value) if isinstance(value, list) else value for key, value in table.items()})
-        for name, table in tables.items()
-    }
+    return {name: Recipe(**_frozen(table)) for name, table in tables.items()}
+
+
+def _frozen(table: Mapping[str, Any]) -> dict[str, Any]:
+    """A table with tuples in place of lists."""
+    return {key: tuple(value) if isinstance(value, list) else value for key, value in table.items()}
 
 
 def recipe_of(material: Material) -> Recipe:

@@ -18,6 +18,8 @@ _OF_THE_BED = {
     "speed": "Up to a speed of", "packing_fraction": "Packing fraction", "grain_ratio": "Grain over tip diameter",
 }  # fmt: skip
 
+_WITHOUT = ("sinkage_without_cohesion", "sinkage_without_cohesion_most")
+
 
 @report_of(named=True)
 def write_ground_report(report: Report) -> Path:
@@ -34,8 +36,7 @@ def write_ground_report(report: Report) -> Path:
 def answer_tiles(result: Result) -> list[Tile]:
     """Rows of the answer: K, C and sinkage, each with half of its 95 % interval, and the bed that they are of."""
     numbers = result["quantities"]
-    ends = [numbers[key]["value"] for key in ("sinkage_without_cohesion", "sinkage_without_cohesion_most")
-            if key in numbers]  # fmt: skip
+    ends = [numbers[key]["value"] for key in _WITHOUT if key in numbers]
     under = f"Sinkage under {quantity(numbers['load'])}" + (", if cohesion holds" if ends else "")
     rows = [
         Tile(name, in_two_digits(_in_95(numbers[key])))
@@ -44,7 +45,7 @@ def answer_tiles(result: Result) -> list[Tile]:
     of_bed = [Tile(words, quantity(numbers[key])) for key, words in _OF_THE_BED.items() if key in numbers]
     if not ends:
         return [*rows, *of_bed]
-    return [*rows, Tile("The same if it does not hold", between(*ends, "m")), *of_bed][:MOST_ROWS]
+    return [*rows, Tile("The same if it does not hold", between(min(ends), max(ends), "m")), *of_bed][:MOST_ROWS]
 
 
 def _in_95(entry: Mapping[str, Any]) -> Mapping[str, Any]:
