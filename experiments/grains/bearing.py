@@ -8,6 +8,10 @@ known by measurement for the materials of recipes.toml, and for others `RESISTAN
 The effect of another cohesion is Terzaghi's bearing capacity of a circular foot (1943, general shear), q = 1.3 c N_c.
 Here N_c = (N_q - 1) cot phi and N_q = exp(pi tan phi) tan^2(45 + phi / 2) (Prandtl 1921, Reissner 1924), phi of the
 grains. It is a lower bound here: a cone in `jsc-1a-loose` met some eight times that (docs/notes/bed.md).
+
+In real grains a pressure p rests at the depth z where p = 1.3 c N_c + rho g z N_q + 0.3 rho g D N_gamma, with N_gamma =
+(N_q - 1) tan(1.4 phi) (Meyerhof 1963) and the bulk density rho. It is evaluated at every friction angle that a footing
+on a material may have (`footing` in recipes.toml).
 """
 
 import math
@@ -17,20 +21,22 @@ from dataclasses import dataclass
 import numpy as np
 
 from dem.grains.materials import Material
+from rigid.intervals import NORMAL
 
 from .recipes import recipe_of
 from .softening import PACKING, bearing_gradient
 
 __all__ = [
-    "COHESIONS", "OF_PLATE", "STICKING", "UNSURE", "Bearing", "bearing_capacity", "bearing_of", "cohesion_of",
-    "friction_angle", "resistance_of", "sinks_past", "strength",
+    "COHESIONS", "OF_PLATE", "STICKING", "UNSURE", "Bearing", "Cohesion", "bearing_capacity", "bearing_of",
+    "cohesion_in_95", "cohesion_of", "enough_cohesion", "footing_angles", "footing_depths", "friction_angle",
+    "resistance_of", "sinks_past", "strength",
 ]  # fmt: skip
 
 COHESIONS = (10.0, 30.0, 100.0, 300.0, 1000.0)
 """Cohesions of regolith for which an answer is given [Pa]."""
 _ANGLES = ((0.0, 21.4), (0.1, 25.0), (0.3, 28.9), (0.356, 30.8), (0.8, 36.4), (1.2, 39.9))
 """Rolling friction -> friction angle at large strain of grains with a friction of 0.5 [degrees], in samples of 600
-grains (docs/notes/materials.md: triaxial; the last one of a ring shear)."""
+grains (docs/notes/materials.md: triaxial; the last one of a ring shear). In 2,000 grains 0.356 has 30.3."""
 _WEAK = 25.0
 """The angle of the grains that K was first fitted to, `sand-weak` [degrees]."""
 _PER_DEGREE = 0.092
@@ -115,3 +121,53 @@ def bearing_of(material: Material, *, grain: float, gravity: float, area: float)
 def sinks_past(bears: Bearing, load: float, depths: Sequence[float]) -> bool:
     """Whether a `load` [N] sinks past all `depths` [m] even where the bed bears `UNSURE` times what is expected."""
     return all(load > UNSURE * bears.load(depth) for depth in depths)
+
+
+@dataclass(frozen=True)
+class Cohesion:
+    """The cohesion of a material with the ends of its 95 % interval, which is not below 0 [Pa]."""
+
+    value: float
+    least: float
+    most: float
+
+
+def cohesion_in_95(material: Material) -> Cohesion | None:
+    """The cohesion of a material [Pa]; None where its error is not known."""
+    recipe = recipe_of(material)
+    if recipe.cohesion is None or recipe.cohesion_std is None:
+        return None
+    half = NORMAL * recipe.cohesion_std
+    return Cohesion(recipe.cohesion, max(0.0, recipe.cohesion - half), recipe.cohesion + half)
+
+
+def footing_angles(material: Material) -> tuple[float, ...]:
+    """Friction angles for a footing [degrees], least first; the one at large strain where no others are known."""
+    return recipe_of(material).footing or (friction_angle(material),)
+
+
+def enough_cohesion(pressure: float, angle: float) -> float:
+    """Cohesion that supports a pressure [Pa] at the surface by itself, at a friction angle [degrees]."""
+    return pressure / bearing_capacity(1.0, angle)
+
+
+def footing_depths(
+    material: Material, pressure: float, *, gravity: float, diameter: float, cohesion: float = 0.0
+) -> tuple[float, float]:
+    """Least and largest depth [m] at which a pressure [Pa] rests, over the friction angles of the material.
+
+    ``gravity``: [m/s2]. ``diameter``: Of the foot [m]. ``cohesion``: Of the soil [Pa].
+    """
+    recipe = recipe_of(material)
+    weight = (recipe.rained or recipe.packed or PACKING) * material.density * gravity
+    depths = [_depth(pressure, weight, diameter, cohesion, angle) for angle in footing_angles(material)]
+    return min(depths), max(depths)
+
+
+def _depth(pressure: float, weight: float, diameter: float, cohesion: float, angle: float) -> float:
+    """The same at one friction angle [degrees]; ``weight``: of the soil [N/m3]."""
+    phi = math.radians(angle)
+    of_depth = math.exp(math.pi * math.tan(phi)) * math.tan(math.pi / 4 + phi / 2) ** 2
+    of_width = (of_depth - 1) * math.tan(1.4 * phi)
+    held = bearing_capacity(cohesion, angle) + 0.3 * weight * diameter * of_width
+    return max(0.0, pressure - held) / (weight * of_depth)

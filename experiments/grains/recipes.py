@@ -1,9 +1,11 @@
 """Default preparation of a bed of each material, what is known of its strength, how densely it rains: recipes.toml."""
 
 import tomllib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 from dem.grains.materials import Material
 
@@ -24,6 +26,8 @@ class Recipe:
     angle: float | None = None  # Friction angle at large strain [degrees]; None: as of the rolling friction
     circle: float | None = None  # Peak angle of the Mohr's circle that gave the cohesion [degrees]; None: not known
     resistance: float | None = None  # What a tip meets for the cohesion alone [Pa]; None: not known
+    footing: tuple[float, ...] | None = None  # Friction angles for a footing, least first [degrees]; None: not known
+    packed: float | None = None  # Packing fraction of the real soil, where grains stick [1]; None: not known
     rained: float | None = None  # Packing fraction of one size, rained and levelled; graded beds get it too [1]
     source: str = ""
 
@@ -31,8 +35,12 @@ class Recipe:
 @cache
 def _recipes() -> dict[str, Recipe]:
     tables = tomllib.loads(_FILE.read_text(encoding="utf-8"))
-    stages = {name: {"stages": tuple(table["stages"])} for name, table in tables.items() if "stages" in table}
-    return {name: Recipe(**table | stages.get(name, {})) for name, table in tables.items()}
+    return {name: Recipe(**_frozen(table)) for name, table in tables.items()}
+
+
+def _frozen(table: Mapping[str, Any]) -> dict[str, Any]:
+    """A table with tuples in place of lists."""
+    return {key: tuple(value) if isinstance(value, list) else value for key, value in table.items()}
 
 
 def recipe_of(material: Material) -> Recipe:

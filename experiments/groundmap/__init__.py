@@ -2,7 +2,7 @@
 
 `Settings`, `check`, `run` and `resume` are those of `hedgebed ground`; calling one imports what computes.
 
-Imports `dem.grains`, `experiments.runs`, `rigid`, `vis.page`.
+Imports `dem.grains`, `experiments.grains`, `experiments.runs`, `rigid`, `vis.page`.
 """
 
 from experiments.runs.registry import face

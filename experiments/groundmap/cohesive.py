@@ -18,10 +18,32 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from dem.grains.materials import MATERIALS
+from experiments.grains.bearing import Cohesion, cohesion_in_95, footing_depths
+from vis.page.numbers import between, foldable
+
 from .answers import SLACK, Answer, Number, asked_of, check_depth, times
 from .settings import say
 
-__all__ = ["CohesiveMap"]
+__all__ = ["CohesiveMap", "Held"]
+
+
+@dataclass(frozen=True)
+class Held:
+    """What the cohesion of the soil carries of an answer, and the sinkage at the least cohesion."""
+
+    cohesion: Cohesion
+    share: float  # of the load that cohesion carries [1]
+    load: float  # [N]
+    sinkage: tuple[float, float]  # at the least cohesion, by K of the map and by Terzaghi's formula, least first [m]
+
+    @property
+    def words(self) -> str:
+        """That the answer holds only with the cohesion, and what is known of it."""
+        low, high = self.sinkage
+        least = f"with {self.cohesion.least:.2g} Pa" if self.cohesion.least > 0 else "without cohesion"
+        sinks = foldable(between(low, high, "m"))
+        return say("if_it_holds", percent=100 * self.share, held=self, least=least, sinks=sinks)
 
 
 @dataclass(frozen=True)
@@ -77,6 +99,26 @@ class CohesiveMap:
         way = min(1.0, (finest - ratio) / (finest - real))
         first, last = self.law["a"] + self.law["b"] * finest, math.log(self.law["stiffness"])
         return first + way * (last - first), math.hypot(off, way * math.log(self.law["within"]))
+
+    def held(self, answer: Answer, *, load: float, gravity: float, diameter: float) -> Held | None:
+        """What the answer owes to the cohesion of the soil; None where its error contains the least cohesion (95 %).
+
+        The part of K that cohesion carries is taken in proportion to it. ``load``: Of the sinkage [N]. ``gravity``:
+        [m/s2]. ``diameter``: Of the tip [m].
+        """
+        stuff = MATERIALS[self.name]
+        found = cohesion_in_95(stuff)
+        if found is None:
+            return None
+        g, size = gravity / self.reference["gravity"], diameter / self.reference["diameter"]
+        share = self.law["share"] * size / ((1 - self.law["share"]) * g * size**2 + self.law["share"] * size)
+        softer = 1 - share + share * found.least / found.value
+        if 1 / softer <= 1 + answer.sinkage.half / answer.sinkage.value:
+            return None
+        depths = footing_depths(stuff, load / (math.pi * diameter**2 / 4), gravity=gravity, diameter=diameter,
+                                cohesion=found.least)  # fmt: skip
+        ends = (load / (softer * answer.stiffness.value), *depths)
+        return Held(found, share, load, (min(ends), max(ends)))
 
     def words(self, answer: Answer, *, gravity: float, diameter: float) -> list[str]:
         """What a person must know of this map besides its numbers."""

@@ -11,7 +11,7 @@ from rigid.ground_file import GROUND_FORMAT, Estimate, Foot, GroundFile
 from rigid.platform.files import find_platform
 
 from .answers import Answer, Number, TooDeepError
-from .cohesive import CohesiveMap
+from .cohesive import CohesiveMap, Held
 from .maps import GroundMap, read_map
 from .settings import GroundSettings, say
 
@@ -53,8 +53,16 @@ def _in_file(number: Number) -> tuple[float, float]:
     return number.value - TO_90 * number.std, number.value + TO_90 * number.std
 
 
+def _held(settings: GroundSettings, table: Map, answer: Answer) -> Held | None:
+    """What the answer owes to the cohesion of the soil; None where that does not matter."""
+    load = answer.load if settings.load is None else settings.load
+    return table.held(answer, load=load, gravity=settings.gravity, diameter=settings.tip_diameter)
+
+
 def ground_file(settings: GroundSettings, table: Map, answer: Answer) -> GroundFile:
     """The spring-damper of the answer."""
+    held = _held(settings, table, answer)
+    notes = (say("of_map", answer=answer), *([] if held is None else [held.words]))
 
     def estimate(number: Number) -> Estimate:
         low, high = _in_file(number)
@@ -63,7 +71,7 @@ def ground_file(settings: GroundSettings, table: Map, answer: Answer) -> GroundF
     depth = table.deepest * settings.tip_diameter
     return GroundFile(
         format=GROUND_FORMAT, law="spring-damper", material=table.name,
-        source=f"hedgebed ground: {table.source}", notes=(say("of_map", answer=answer),),
+        source=f"hedgebed ground: {table.source}", notes=notes,
         foot=Foot(tip="sphere", diameter=settings.tip_diameter),
         parameters={"stiffness": estimate(answer.stiffness), "damping": estimate(answer.damping)},
         range={
@@ -111,6 +119,14 @@ def _compute(settings: GroundSettings, folder: RunFolder, progress: Progress) ->
     }
     words = table.words(answer, gravity=settings.gravity, diameter=settings.tip_diameter)
     unknown = [say("too_deep", load=load, deepest=1e3 * table.deepest * settings.tip_diameter)] if too_deep else []
+    held = _held(settings, table, answer)
+    if held is not None:
+        low, high = held.sinkage
+        quantities |= {
+            "sinkage_without_cohesion": quantity(low, "m", say("of_least", held=held), std=None),
+            "sinkage_without_cohesion_most": quantity(high, "m", say("of_least_most", held=held), std=None),
+        }
+    unknown = [*([] if held is None else [held.words]), *unknown]
     warnings = [*unknown, *_of_no_platform(settings, table, answer), *words]
     low, high = c.value - c.half, c.value + c.half
     if low <= 0:

@@ -112,6 +112,9 @@ class GroundMap:
             stiffness, scaled["damping"], sinkage, asked.load, asked.grain, ratio, asked.packing, speed, deep
         )  # fmt: skip
 
+    def held(self, answer: Answer, *, load: float, gravity: float, diameter: float) -> None:
+        """These grains have no cohesion that could fail."""
+
     def words(self, answer: Answer, *, gravity: float, diameter: float) -> list[str]:
         """What a person must know of this map besides its numbers; gravity [m/s2] and diameter [m] change nothing."""
         told = [say("of_real_grains")] if gravity < ON_EARTH else []

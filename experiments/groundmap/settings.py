@@ -22,7 +22,7 @@ class GroundSettings(StrictSettings):
         0.012, description="Diameter of the tip [m].", json_schema_extra={"option_alias": "--spike-diameter"}
     )
     tip: Literal["sphere", "cone", "flat"] = Field(
-        "sphere", description="Shape of the tip; the map has only sphere, a ball tip."
+        "sphere", description="Shape of the tip: only sphere, a ball tip, has a map; cone and flat are refused."
     )
     packing: Annotated[float, Field(gt=0, lt=1)] | None = None
     """Packing fraction [1]; that of the rained bed of the map if not given."""

@@ -14,10 +14,18 @@ from dataclasses import asdict
 from typing import Any
 
 from dem.grains.materials import MATERIALS
-from experiments.grains.bearing import COHESIONS, UNSURE, bearing_capacity, bearing_of, friction_angle, strength
-from experiments.grains.recipes import recipe_of
+from experiments.grains.bearing import (
+    COHESIONS,
+    UNSURE,
+    bearing_capacity,
+    bearing_of,
+    cohesion_in_95,
+    enough_cohesion,
+    footing_angles,
+    footing_depths,
+    strength,
+)
 from experiments.runs.types import Json
-from rigid.intervals import NORMAL
 from rigid.platform.rig import STANDARD_GRAVITY
 from vis.penetrate.summary import REAL_GRAINS
 
@@ -56,35 +64,38 @@ def answer(findings: Findings, material: Any) -> Json | None:
     depths = [load / stiffness, max(0.0, load - expected.held) / plate]
     low, high = min(depths), max(depths)
     never = low > settings.foot
-    angle = friction_angle(material)
-    per_pascal = bearing_capacity(1.0, angle) * area
+    angles = footing_angles(material)
+    per_pascal = bearing_capacity(1.0, angles[0]) * area
     rows = [{"cohesion": c, "carries": c * per_pascal, "depth": max(0.0, load - c * per_pascal) / stiffness}
             for c in COHESIONS]  # fmt: skip
-    enough = load / per_pascal
+    enough = [enough_cohesion(load / area, angle) for angle in angles]
+    formula = footing_depths(material, load / area, gravity=settings.gravity, diameter=settings.tip_diameter)
     told: Json = {
         "s": settings, "depth": _length(depths[0]), "foot": 1e3 * settings.foot, "floor": 1e3 * settings.bed_size[2],
-        "plate": _length(depths[1]),
-        "angle": angle, "enough": f"{enough:.2g}", "g": settings.gravity / STANDARD_GRAVITY,
-        "driven": 1e3 * settings.depth, "of_k": "the fitted K" if findings.fit.stiffness > 0 else "the expected K",
+        "plate": _length(depths[1]), "formula": _lengths(*formula), "angle": angles[0],
+        "angles": _ends(*angles), "enough": _ends(*reversed(enough), digits=2),
+        "g": settings.gravity / STANDARD_GRAVITY, "driven": 1e3 * settings.depth,
+        "of_k": "the fitted K" if findings.fit.stiffness > 0 else "the expected K",
         "body": say("body_first"),
     }  # fmt: skip
     beside = _beside(settings) if material.cohesion == "none" else None
     sentences = [say("rests_never" if never else "rests_below_the_bed", **told)]
+    sentences += [say("by_formula", **told)] if never and beside is not None else []
     sentences += [say("left_out")] if not stood else []
     sentences += [say("with_cohesion", **told)] + ([] if beside is None else [beside.pop("sentence")])
     return {
         "comes_to_rest": False, "at_any_depth_of_the_foot": not never, "load": load, "foot": settings.foot,
         "depth": depths[0], "depth_range": [low, high], "depth_expected": expected.depth(load),
-        "stiffness": stiffness, "stiffness_plate": plate,
-        "friction_angle": angle, "cohesion_enough": enough, "cohesions": rows, "sentences": sentences,
-        "source": say("terzaghi"), **({} if beside is None else {"beside": beside}),
+        "depth_formula": list(formula), "stiffness": stiffness, "stiffness_plate": plate,
+        "friction_angle": angles[0], "cohesion_enough": enough[0], "cohesions_enough": enough, "cohesions": rows,
+        "sentences": sentences, "source": say("terzaghi"), **({} if beside is None else {"beside": beside}),
     }  # fmt: skip
 
 
 def _beside(settings: PenetrateSettings) -> Json:
-    """The foot on `_BESIDE`: the cohesion that carries it by either angle, and the depth at which it would rest.
+    """The foot on `_BESIDE`: the cohesion that carries it by each angle, and the depth at which it would rest.
 
-    Friction angle and K are those of `_BESIDE`, not of these grains: N_c grows from 32 at 31 degrees to 55 at 37.
+    Friction angles and K are those of `_BESIDE`, not of these grains: N_c grows from 32 at 31 degrees to 55 at 37.
     """
     found, told = _by_cohesion(settings, MATERIALS[_BESIDE])
     verdict = say(f"beside_{told.pop('verdict')}", **told)
@@ -95,8 +106,7 @@ def _stuck(settings: PenetrateSettings, material: Any) -> Json | None:
     """The entry "rest" of a flat foot that rests on grains that stick, larger than real ones; None where the cohesion
     has no known error. K is the one expected of the material (`bearing_of`).
     """
-    recipe = recipe_of(material)
-    if recipe.cohesion is None or recipe.cohesion_std is None or recipe.circle is None:
+    if cohesion_in_95(material) is None:
         return None
     found, told = _by_cohesion(settings, material)
     verdict = say(f"sticky_{told.pop('verdict')}", **told)
@@ -108,36 +118,42 @@ def _stuck(settings: PenetrateSettings, material: Any) -> Json | None:
 
 
 def _by_cohesion(settings: PenetrateSettings, material: Any) -> tuple[Json, Json]:
-    """The cohesion that a material has and needs, and the depths [m] where K carries the rest of the load.
+    """The cohesion that a material has and needs, and the depths [m] where the rest of the load is carried.
 
-    The ends are those of the 95 % interval of the cohesion, which is not below 0. K is the one expected of the
-    material, times `UNSURE` at the lower end and over it at the upper. "depth_least_cohesion" has both ends of K at the
-    least cohesion. Returns the numbers, and what the sentences on them take, with "verdict": holds, sinks or open.
+    Two estimates, and the range holds both: the K expected of the material, times `UNSURE` at the lower end and over it
+    at the upper, and Terzaghi's formula over the angles of the material. The cohesion is taken at the ends of its 95 %
+    interval. "depth_least_cohesion" has both estimates at the least cohesion. Returns the numbers, and what the
+    sentences on them take, with "verdict": holds, sinks or open.
     """
-    recipe, area = recipe_of(material), math.pi * settings.tip_diameter**2 / 4
-    assert recipe.cohesion is not None and recipe.cohesion_std is not None and recipe.circle is not None
-    load, angle = settings.weight, friction_angle(material)
-    needs = [load / (bearing_capacity(1.0, phi) * area) for phi in (angle, recipe.circle)]
-    half = NORMAL * recipe.cohesion_std
-    least, most = max(0.0, recipe.cohesion - half), recipe.cohesion + half
-    shares = [max(0.0, 1.0 - most / min(needs)), max(0.0, 1.0 - least / max(needs))]
+    found = cohesion_in_95(material)
+    assert found is not None
+    load, area, angles = settings.weight, math.pi * settings.tip_diameter**2 / 4, footing_angles(material)
+    needs = [enough_cohesion(load / area, angle) for angle in angles]  # falls with the angle
+    shares = [max(0.0, 1.0 - found.most / needs[-1]), max(0.0, 1.0 - found.least / needs[0])]
     stiffness = bearing_of(material, grain=settings.grain, gravity=settings.gravity, area=area).stiffness
-    low, high = load * shares[0] / (UNSURE * stiffness), load * shares[1] * UNSURE / stiffness
-    least_low = load * shares[1] / (UNSURE * stiffness)
-    found: Json = {
-        "material": material.name, "cohesion": recipe.cohesion, "cohesion_std": recipe.cohesion_std,
-        "friction_angles": [angle, recipe.circle], "cohesions_enough": needs, "depth_range": [low, high],
-        "depth_least_cohesion": [least_low, high], "stiffness": stiffness,
+    soft, hard = load * UNSURE / stiffness, load / (UNSURE * stiffness)
+    strong, weak = (
+        footing_depths(material, load / area, gravity=settings.gravity, diameter=settings.tip_diameter, cohesion=c)
+        for c in (found.most, found.least)
+    )
+    by_k = (hard * shares[1], soft * shares[1])
+    low, high = min(hard * shares[0], strong[0]), max(by_k[1], weak[1])
+    least_low = min(by_k[0], weak[0])
+    numbers: Json = {
+        "material": material.name, "cohesion": found.value, "cohesion_95": [found.least, found.most],
+        "friction_angles": list(angles), "cohesions_enough": needs, "depth_range": [low, high],
+        "depth_least_cohesion": [least_low, high], "depth_expected_k": list(by_k), "depth_formula": list(weak),
+        "stiffness": stiffness,
     }  # fmt: skip
     told: Json = {
-        "name": material.name, "beside": material.name, "cohesion": recipe.cohesion, "least": least, "most": most,
-        "angle": angle, "circle": recipe.circle, "large": f"{needs[0]:.2g}", "peak": f"{needs[1]:.2g}",
-        "low": _length(low), "high": _length(high), "least_low": _length(least_low),
-        "without": f"with {least:.2g} Pa" if least > 0 else "without cohesion",
-        "bounds": say("bounds"),
+        "name": material.name, "beside": material.name, "cohesion": found.value, "least": found.least,
+        "most": found.most, "low": _length(low), "high": _length(high), "by_k": _lengths(*by_k),
+        "by_formula": _lengths(*weak), "needs": say("needs", needs=_listed(needs, digits=2), angles=_listed(angles)),
+        "without": f"with {found.least:.2g} Pa" if found.least > 0 else "without cohesion",
         "verdict": "holds" if high == 0 else "sinks" if low > 0 else "open",
     }  # fmt: skip
-    return found, told | {"branches": say("branches", **told)}
+    told["bounds"] = say("bounds", **told)
+    return numbers, told | {"branches": say("branches", **told)}
 
 
 def sinkage_interval(findings: Findings, material: Any) -> Interval | None:
@@ -172,7 +188,16 @@ def how_sure(findings: Findings, material: Any, rest: Json | None) -> Json:
     ends = None if stiffness is None else interval_of_rest(settings.weight, stiffness, rest["depth_range"][1])
     beyond = settings.weight / force if force > 0 else None
     low, high = ends or (None, None)
-    times = "" if beyond is None else say("far_beyond", times=_two_digits(beyond), force=f"{force:.2g}")
+    times = (
+        ""
+        if beyond is None
+        else say(
+            "far_beyond",
+            times=_two_digits(beyond),
+            force=f"{force:.2g}",
+            one=", in one of the beds" if len(findings.seeds) > 1 else "",
+        )
+    )
     if low is None:
         known = say("rest_unknown", why=_why_unknown(findings, stiffness, cohesive=material.cohesion != "none"))
     else:
@@ -223,3 +248,20 @@ def _two_digits(number: float) -> str:
 
 def _length(depth: float) -> str:
     return f"{depth:.2g} m" if depth >= 0.1 else f"{1e3 * depth:.2g} mm"
+
+
+def _lengths(low: float, high: float) -> str:
+    """Two depths with one unit, or one where they are the same."""
+    return in_words(low, high, "m") if high > low else _length(low)
+
+
+def _ends(*values: float, digits: int = 3) -> str:
+    """The first and the last of some numbers, or one where they are the same: "28.9 to 34.2"."""
+    texts = [f"{value:.{digits}g}" for value in (values[0], values[-1])]
+    return texts[0] if texts[0] == texts[1] else " to ".join(texts)
+
+
+def _listed(values: Sequence[float], *, digits: int = 3) -> str:
+    """Some numbers: "54, 35 or 7.2"."""
+    texts = [f"{value:.{digits}g}" for value in values]
+    return texts[0] if len(texts) == 1 else f"{', '.join(texts[:-1])} or {texts[-1]}"

@@ -1,6 +1,6 @@
 """From the finished runs of a folder to the result of penetrate: the fit, the same runs on the law, what departs."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 
@@ -14,6 +14,7 @@ from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
 from experiments.runs.result import Result
 from experiments.runs.types import Json
+from vis.penetrate.summary_parts import joined
 
 from . import beds
 from .amended import kept_law, run_beside
@@ -29,7 +30,7 @@ from .units import Unit, make_spike
 
 __all__ = [
     "SHIPPED_RESULT", "conclude", "departures_in_words", "overlap_warning", "softening_note", "staged_note",
-    "stiffer_note", "warnings_of",
+    "stiffer_note", "stiffer_warning", "warnings_of",
 ]  # fmt: skip
 
 SHIPPED_RESULT = Path(__file__).parents[2] / "docs" / "results" / "penetrate-sand" / "result.json"
@@ -72,7 +73,7 @@ def conclude(
     found = [
         *(say("bed_missing", why=why) for why in missing.values()),
         *fast_for_gravity(settings, material.friction),
-        *map(stiffer_note, stiffened),
+        *stiffer_warning(stiffened),
         None if stiffened else overlap_warning(overlap, settings, softening),
         *(grading_warning(entry.grading) for entry in facts if entry.grading is not None),
         unmatched_warning(settings.graded, material, packing=settings.packing, stages=beds.stages_of(settings)),
@@ -197,27 +198,36 @@ def warnings_of(findings: Findings) -> Iterator[str]:
         yield "the spring-damper did not come to rest: there is no sinkage_spring_damper"
     if sunk["value"] is not None and sunk["value"] < 2 * grain:  # hardly more than a grain
         several = sum(value is not None for value in findings.sinkages(findings.beds)) > 1
-        so = "its spread between seeds is part of the answer" if several else "another seed will give another"
         if sunk["value"] < 0:
-            yield say("on_top", shown=_words(sunk | {"value": -sunk["value"]}), mm=1e3 * grain, so=so)
+            yield say("on_top", shown=_words(sunk | {"value": -sunk["value"]}), mm=1e3 * grain)
         else:
+            so = "its spread between seeds is part of the answer" if several else "another seed will give another"
             yield say("shallow", shown=_words(sunk), grains=sunk["value"] / grain, so=so)
     bound = overdamped_below(settings.weight, settings.lowering_speed) / pace_of(settings)
     if findings.of("set_down") and fit.stiffness > bound:
         yield say("overdamped", fit=fit, bound=bound)
-    conditions = {unit.condition for unit in findings.units if unit.id in fit.runs}
-    if len(conditions) < LEAST_CONDITIONS or abs(fit.correlation or 0.0) > MOST_CORRELATED:
-        shown = "unknown" if fit.correlation is None else f"{fit.correlation:.2f}"
-        listed = ", ".join(f"{kind} at {v:g} m/s" for kind, v in sorted(conditions))
-        yield say("inseparable", shown=shown, listed=listed)
-    own = [one.correlation for one in findings.seed_fits.values() if one.correlation is not None]
-    if len(own) >= 2 and not findings.beds_separate:
-        yield say("traded", least=min(own))
+    yield from _not_separated(findings)
     yield from resolution_advice(**beds.resolution_of(settings))
     if fit.damping == 0:
         yield say("damping_zero")
     if fit.stiffness == 0:
         yield "the stiffness fitted is 0, its bound: the law has no resting sinkage"
+
+
+def _not_separated(findings: Findings) -> Iterator[str]:
+    """That the runs do not separate K from C, of all beds or of each, and when to act: one warning at most."""
+    fit = findings.fit
+    conditions = {unit.condition for unit in findings.units if unit.id in fit.runs}
+    own = [one.correlation for one in findings.seed_fits.values() if one.correlation is not None]
+    each = len(own) >= 2 and not findings.beds_separate
+    needed = "" if findings.of("set_down") else say("rest_needs_k")
+    if len(conditions) < LEAST_CONDITIONS or abs(fit.correlation or 0.0) > MOST_CORRELATED:
+        shown = "unknown" if fit.correlation is None else f"{fit.correlation:.2f}"
+        listed = ", ".join(f"{kind} at {v:g} m/s" for kind, v in sorted(conditions))
+        beds_too = say("nor_of_each_bed") if each else ""
+        yield say("inseparable", shown=shown, listed=listed, each=beds_too, needed=needed)
+    elif each:
+        yield say("traded", least=min(own), needed=needed)
 
 
 def softening_note(settings: PenetrateSettings, softening: Softening) -> str:
@@ -246,6 +256,18 @@ def stiffer_note(note: Json) -> str:
     """That grains were made stiffer by the run itself: `note` as the entry "stiffened" of result.json has it."""
     where = note["unit"] or "the preparation of the bed"
     return say("stiffer", note=note, where=where, percent=100 * note["overlap"])
+
+
+def stiffer_warning(notes: Sequence[Json]) -> list[str]:
+    """The same of all seeds as one warning, as the runs were repeated without anybody's help; none without notes."""
+    if not notes:
+        return []
+    seeds = sorted({note["seed"] for note in notes})
+    young = {note["seed"]: note["young"] for note in notes}.values()  # the last of each seed
+    last = " to ".join(dict.fromkeys(f"{value:.3g}" for value in (min(young), max(young))))
+    overlap = max(note["overlap"] for note in notes)
+    return [say("stiffer_seeds", seeds=joined(list(map(str, seeds))), percent=100 * overlap, last=last,
+                which="seed" if len(seeds) == 1 else "seeds")]  # fmt: skip
 
 
 def overlap_warning(overlap: float | None, settings: PenetrateSettings, softening: Softening) -> str | None:

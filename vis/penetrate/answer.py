@@ -119,17 +119,17 @@ def _among_real_grains(result: Entries, entry: Entries) -> Tile:
     rest = words.mapping_of(result.get("rest"))
     bounds = words.list_of(rest.get("depth_range"))
     if rest.get("comes_to_rest") is True and len(bounds) == 2:
-        return _by_cohesion(bounds, words.list_of(rest.get("depth_least_cohesion")))
+        return _by_cohesion(bounds)
     return Tile("Sinkage among real grains (95 %)", "not known", words.sentence(str(entry["sentence"])))
 
 
-def _by_cohesion(bounds: Sequence[float], otherwise: Sequence[float]) -> Tile:
-    """What cohesion and the expected K give: at the surface, between two depths, or one or the other of these."""
-    label, (low, high) = "Sinkage by cohesion and expected K", bounds
+def _by_cohesion(bounds: Sequence[float]) -> Tile:
+    """What cohesion, the expected K and a formula give: at the surface, between two depths, or one of both."""
+    label, (low, high) = "Sinkage with and without cohesion", bounds
     if not high:
         return Tile(label, quote(0.0, 0.0, "m"), say("supported"))
-    if low == 0 and len(otherwise) == 2:
-        return Tile(label, f"0, or {between(otherwise[0], otherwise[1], 'm')}", say("supported_or_not"))
+    if low == 0:
+        return Tile(label, f"0, or up to {quote(high, None, 'm', significant=2)}", say("supported_or_not"))
     return Tile(label, between(low, high, "m"), say("bounds_of_k"))
 
 
@@ -149,7 +149,11 @@ def _beyond(result: Entries, needed: float, load: str, law: str) -> list[Tile]:
 
 def _force(result: Entries) -> list[Tile]:
     push = largest_force(result)
-    return [] if push is None else [Tile(f"Largest force of {grains_of(result)}", push[0], push[2], beside=push[1])]
+    if push is None:
+        return []
+    of_beds = ", mean of beds" if "±" in push[0] else ""
+    label = f"Largest force of {grains_of(result)}{of_beds}"
+    return [Tile(label, push[0], push[2], beside=push[1])]
 
 
 def _returned(numbers: Entries) -> list[Tile]:
@@ -165,11 +169,12 @@ def _law(result: Entries, numbers: Entries) -> list[Tile]:
     if words.value_of(numbers, "stiffness") is None:
         return []
     sure = _sure(result, "stiffness")
-    value = quote(sure["value"], None, "N/m", significant=2) if sure else quantity(numbers["stiffness"])
+    value = quote(sure["value"], None, "N/m", significant=2) if sure else _with_fit_error(result, numbers, "stiffness")
     tile = Tile("Fitted stiffness K", value, _note_of_law(result, numbers, sure))
     tiles = [replace(tile, errors=_errors(sure)) if sure else tile]
     if words.value_of(numbers, "damping") is not None:
-        tiles.append(Tile("Fitted damping C", quantity(numbers["damping"]), _own_error(numbers, "damping")))
+        value = _with_fit_error(result, numbers, "damping")
+        tiles.append(Tile("Fitted damping C", value, _own_error(numbers, "damping")))
     return tiles
 
 
@@ -187,6 +192,13 @@ def _note_of_law(result: Entries, numbers: Entries, sure: Entries) -> str:
         parts.append(say("error_of_force", gap=quantity(numbers["drag_gap"], unit="%")))
     known = bool(sure) and sure["low"] is not None  # the interval of real grains contains the error of the fit
     return "; ".join(filter(None, (*parts, "" if known else _own_error(numbers, "stiffness"))))
+
+
+def _with_fit_error(result: Entries, numbers: Entries, key: str) -> str:
+    """K or C; of several beds that do not separate them, with half of the 95 % interval of the fit to all beds."""
+    entry, error = numbers[key], words.value_of(numbers, f"{key}_error")
+    several = len(words.list_of(result.get("fits"))) > 1
+    return quantity({**entry, "std": error} if several and entry.get("std") is None and error is not None else entry)
 
 
 def _own_error(numbers: Entries, key: str) -> str:

@@ -87,6 +87,15 @@ def test_a_fit_that_cannot_tell_the_two_says_so(tmp_path, given, told):
     assert not told or ("two speeds" in said[0] and "two drop_speeds" in said[0])
 
 
+def test_beds_pushed_at_one_speed_get_one_warning_of_k_and_c(tmp_path):
+    """All beds together and each by itself do not separate them: two warnings would say the same."""
+    given = {"seeds": (1, 2), "speeds": (0.2,), "other_speeds": (0.2,), "drop_speeds": (), "other_drop_speeds": ()}
+    result = penetrate.run(PenetrateSettings(**(QUICK | given)), tmp_path / "run")
+    assert not any(fit["separates"] for fit in result["fits"])
+    (said,) = (text for text in result["warnings"] if "separate" in text)
+    golden("penetrate/not_separated", said)
+
+
 def test_a_bed_less_than_six_tips_wide_is_said(tmp_path):
     wide = PenetrateSettings(**QUICK)
     narrow = wide.model_copy(update={"tip_diameter": 0.016})

@@ -99,3 +99,20 @@ def test_a_report_older_than_its_result_is_made_anew(tmp_path, capsys, monkeypat
     os.utime(folder.path / "report.html", (1e9, 1e9))
     assert main(["resume", str(folder.path), "--quiet"]) == 0 and drawn == [folder.path]
     assert "older than result.json" in capsys.readouterr().err
+
+
+def test_k_of_beds_that_do_not_separate_it_has_the_error_of_the_fit():
+    """docs/penetrate.md quotes 3,100 ± 4,600 N/m: Student's 4.30 times the standard error over three runs."""
+    result = json.loads((KEPT / "penetrate-foot-jsc-1a-1g" / "result.json").read_text(encoding="utf-8"))
+    assert result["quantities"]["stiffness"]["std"] is None
+    half = 4.303 * result["quantities"]["stiffness_error"]["value"]
+    (row,) = (row for row in penetrate_headline(result).rows if "stiffness" in row[0])
+    assert row[1].split()[0] == "3100" and row[2].split()[0] == f"{float(f'{half:.2g}'):.0f}"
+
+
+def test_the_mean_of_the_largest_forces_is_called_one():
+    """The largest of all, over which a load is so many times, is another number."""
+    for name, several in (("penetrate-foot-sand-beds", True), ("penetrate-foot-sand", False)):
+        result = json.loads((KEPT / name / "result.json").read_text(encoding="utf-8"))
+        (label,) = (tile.label for tile in answer_tiles(result) if tile.label.startswith("Largest"))
+        assert ("mean of beds" in label) == several
