@@ -14,6 +14,7 @@ import math
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -27,6 +28,8 @@ parser.add_argument("--size", type=float, nargs=3, default=(0.06, 0.03, 0.03), h
 parser.add_argument("--grain", type=float, default=0.003, help="mean diameter [m]")
 parser.add_argument("--angles", type=float, nargs="+", default=(36.0,), help="of the slope [degrees]")
 parser.add_argument("--duration", type=float, default=0.4, help="of the flow [s]")
+parser.add_argument("--rolling", type=float, help="coefficient of rolling friction in place of sand's [1]")
+parser.add_argument("--sliding", type=float, help="coefficient of friction in place of sand's [1]")
 parser.add_argument("--seeds", type=int, nargs="+", default=(1,), help="of the prepared beds")
 parser.add_argument("--kinds", nargs="+", default=("ours", "lammps"), help="ours, lammps, or terms of terms.py")
 parser.add_argument("--out", type=Path, required=True, help="the CSV; rows are added to it")
@@ -80,6 +83,8 @@ def barred(bed, bars, asked):
 def flow(asked, seed, kind, angle):
     """Mean velocity down the slope at the end of each part [m/s], shape [PARTS]."""
     stuff, grains, bars, step = start_of(asked, seed)
+    given = {"rolling_friction": asked.rolling, "friction": asked.sliding}
+    stuff = replace(stuff, **{name: value for name, value in given.items() if value is not None})
     if kind not in ("ours", "lammps"):
         from terms import OVERLAP, patch
 
