@@ -11,10 +11,13 @@ others is 0: they meet a grain as a plane does. Further shapes are in ``dem.shap
 import math
 from dataclasses import astuple, dataclass
 
+import numpy as np
+
 from hedgebed_taichi import ti
 
 __all__ = ["Ball", "Cone", "Cylinder", "Plane", "Primitive", "Shape", "distance_to", "rotate"]
 
+Bounds = tuple[np.ndarray, np.ndarray]
 PLANE, BALL, FRUSTUM, CAPSULE, BOX, TUBE, MESH = range(7)
 PLACED = 16  # Added to the kind of a shape that has a place of its own in the body
 ROW_WIDTH, PLACE_WIDTH = 6, 8  # Numbers in ``Shape.row`` and in ``Shape.place``
@@ -56,6 +59,10 @@ class Shape:
         """Largest distance from the body's origin to the surface [m], or a little more; infinite for a plane."""
         raise NotImplementedError
 
+    def bounds(self) -> Bounds:
+        """Lowest and highest coordinates in the body's frame [m], each of shape [3]; infinite for a plane."""
+        raise NotImplementedError
+
 
 @dataclass(frozen=True)
 class Plane(Shape):
@@ -78,6 +85,9 @@ class Plane(Shape):
     def extent(self) -> float:
         return math.inf
 
+    def bounds(self) -> Bounds:
+        return np.full(3, -math.inf), np.full(3, math.inf)
+
 
 @dataclass(frozen=True)
 class Ball(Shape):
@@ -97,6 +107,9 @@ class Ball(Shape):
 
     def extent(self) -> float:
         return math.hypot(*self.center) + self.radius
+
+    def bounds(self) -> Bounds:
+        return np.array(self.center) - self.radius, np.array(self.center) + self.radius
 
 
 @dataclass(frozen=True)
@@ -119,6 +132,10 @@ class Round(Shape):
 
     def extent(self) -> float:
         return math.hypot(max(abs(self.bottom), abs(self.top)), max(astuple(self)[2:]))
+
+    def bounds(self) -> Bounds:
+        widest = max(astuple(self)[2:])
+        return np.array([-widest, -widest, self.bottom]), np.array([widest, widest, self.top])
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .basic import MESH, Shape
+from .basic import MESH, Bounds, Shape
 
 __all__ = ["Feature", "Mesh", "MeshTree", "Polyhedron", "mesh_from_file", "mesh_tree"]
 
@@ -30,8 +30,7 @@ class Surface(Shape):
     def extent(self) -> float:
         return float(np.sqrt((self.mesh.vertices**2).sum(axis=1).max()))
 
-    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """Lowest and highest coordinates in the body's frame [m], each of shape [3]."""
+    def bounds(self) -> Bounds:
         return self.mesh.vertices.min(axis=0), self.mesh.vertices.max(axis=0)
 
 

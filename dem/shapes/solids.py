@@ -4,6 +4,7 @@ As ``dem.shapes.basic``: one row of six numbers each, and for points outside the
 count as flat (R* the grain's radius), and so do the wall of a tube and the side of a capsule.
 """
 
+import itertools
 import math
 from dataclasses import dataclass
 
@@ -11,7 +12,7 @@ import numpy as np
 
 from hedgebed_taichi import ti
 
-from .basic import BOX, CAPSULE, PLACED, TUBE, Round, Shape, refuse_length, refuse_point
+from .basic import BOX, CAPSULE, PLACED, TUBE, Bounds, Round, Shape, refuse_length, refuse_point
 
 __all__ = ["Box", "Capsule", "Placed", "Tube"]
 
@@ -41,6 +42,9 @@ class Capsule(Shape):
     def extent(self) -> float:
         return max(math.hypot(*self.start), math.hypot(*self.end)) + self.radius
 
+    def bounds(self) -> Bounds:
+        return np.minimum(self.start, self.end) - self.radius, np.maximum(self.start, self.end) + self.radius
+
 
 @dataclass(frozen=True)
 class Box(Shape):
@@ -61,6 +65,9 @@ class Box(Shape):
 
     def extent(self) -> float:
         return math.hypot(*(abs(c) + 0.5 * s for c, s in zip(self.center, self.size, strict=True)))
+
+    def bounds(self) -> Bounds:
+        return np.array(self.center) - 0.5 * np.array(self.size), np.array(self.center) + 0.5 * np.array(self.size)
 
 
 @dataclass(frozen=True)
@@ -114,6 +121,16 @@ class Placed(Shape):
 
     def extent(self) -> float:
         return math.hypot(*self.position) + self.shape.extent()
+
+    def bounds(self) -> Bounds:
+        """As of `Shape`, or a little more: of the corners of the shape's own bounds."""
+        low, high = self.shape.bounds()
+        if not np.isfinite(low).all():
+            return low, high
+        corners = np.array(list(itertools.product(*zip(low, high, strict=True))))
+        w, *axis = np.array(self.turn, dtype=float) / math.hypot(*self.turn)
+        turned = corners + 2 * np.cross(axis, np.cross(axis, corners) + w * corners)
+        return turned.min(axis=0) + self.position, turned.max(axis=0) + self.position
 
 
 # Each returns the signed distance [m], the outward unit normal and the curvature [1/m] at a point of the shape's frame.

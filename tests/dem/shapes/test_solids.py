@@ -1,13 +1,14 @@
 """Capsules, boxes, tubes, meshes among grains: one contact a grain, no edge felt twice, nothing leaks through."""
 
 import math
+import warnings
 
 import numpy as np
 import pytest
 import solid_shapes
 from single_grains import RADIUS, STUFF, grains_at, rotated
 
-from dem import Ball, Box, Capsule, Cylinder, Facing, Material, Mesh, Placed, Polyhedron, Tube
+from dem import Ball, Box, Capsule, Cone, Cylinder, Facing, Material, Mesh, Placed, Plane, Polyhedron, Tube
 from dem.contact.law import effective_moduli
 from dem.engine import runtime
 from dem.engine.shape_table import ShapeTable
@@ -80,6 +81,35 @@ def signed(shape, p):
     if ((p > low) & (p < high)).all():
         return -min((p - low).min(), (high - p).min())
     return np.linalg.norm(p - np.clip(p, low, high))
+
+
+@pytest.mark.parametrize(
+    ("shape", "tight"),
+    [
+        (CAPSULE, True), (BOX, True), (TUBE, True), (Placed(BOX, (0.001, -0.002, 0.0), TURN), False),
+        (Ball((0.001, 0.0, 0.0), 0.004), True), (Cylinder(-0.002, 0.006, 0.003), True),
+        (Cone(0.0, 0.005, 0.0, 0.004), True),
+    ],
+)  # fmt: skip
+def test_all_of_a_shape_is_within_its_bounds(distances, shape, tight):
+    low, high = shape.bounds()
+    points = np.random.default_rng(3).uniform(low - 0.002, high + 0.002, (60_000, 3))
+    inside = points[distances(shape, points)[0] <= 0]
+    assert (inside > low - 1e-12).all() and (inside < high + 1e-12).all()
+    left = np.maximum(inside.min(axis=0) - low, high - inside.max(axis=0))
+    assert left.max() < (6e-4 if tight else 2.5e-3)  # some of it is near every side; of a turned box, its corners
+
+
+def test_parts_that_no_grain_can_meet_are_warned_of():
+    """A grain is sought within half the period of the body's origin (as images in molecular dynamics)."""
+    bed = grains_at((0.01, 0.01, 0.05))
+    far = Capsule((0.030, -0.005, 0.0), (0.030, 0.005, 0.0), 0.001)
+    with pytest.warns(UserWarning, match=r"a Capsule .* reaches 0\.031 m along x .*period, 0\.0225 m"):
+        bed.add_body([Ball(radius=0.003), far], position=(0.02, 0.02, 0.0))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        bed.add_body(Box((0.045, 0.06, 0.002)), position=(0.02, 0.02, 0.0))  # spans the period along y
+        bed.add_body([Cylinder(0.0, 0.3, 0.003), Plane()], position=(0.02, 0.02, 0.03))
 
 
 @pytest.mark.parametrize("shape", [CAPSULE, BOX, TUBE])
