@@ -1,6 +1,6 @@
-"""Sensors of tumbles: what camera, IMU and wheel read of a motion, and what uncertain numbers do not explain of a change.
+"""Sensors of tumbles: what camera, IMU and wheel read of a motion; what uncertain numbers do not explain of a change.
 
-Nothing here comes from `rigid`, `coupling` or `experiments`, and nothing here moves a platform: it serves any simulator.
+Nothing here comes from `rigid`, `coupling` or `experiments`, and nothing moves a platform: it serves any simulator.
 Camera, IMU and wheel have clocks and origins of their own: the camera's scale is about its own origin on the
 surface, the IMU's first sample falls where its clock puts it.
 """
