@@ -79,7 +79,7 @@ def test_a_motor_speeds_its_wheel_up_by_its_torque_while_a_spike_touches():
 
 
 def test_without_anything_hidden_mujoco_stays_near_the_base_model_where_its_contacts_are_nearly_springs():
-    """Of the noise: 1 a sample. MuJoCo's usual impedance adds a mass of nine platforms to a tip that touches."""
+    """Of the noise: 1 a sample. MuJoCo's usual impedance adds 13 platforms to a tip that touches."""
     assert gaps({}).max() < 1.25
     assert gaps({}, contact=Contact(impedance=0.9)).max() > 2.5
 
