@@ -69,7 +69,8 @@ def run(
         out: folder of cases.jsonl, which grows as it goes, and is where it goes on.
         progress: what is done, and how long it has to go.
         kind: of campaigns: penetration, tumble, rig (penetrations of another maker), both (the first two) or all
-            three; second-push, second-rig, second-tumble or second (all three of the second simulator); mujoco-tumble.
+            three; second-push, second-rig, second-tumble or second (all three of the second simulator). Or
+            mujoco-tumble, tumbles that MuJoCo moves.
         count: campaigns of each kind.
         seed: of the suite.
         only: hide this in every campaign; empty: the suite's mixture.

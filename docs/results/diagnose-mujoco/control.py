@@ -3,8 +3,8 @@
     python docs/results/diagnose-mujoco/control.py 2027015:base:1 2027015:mujoco:0.95 >> control.jsonl
 
 An argument is the seed of a campaign in tumble-2027, what moves it (`mujoco`, or `base`: benchmarks/second without its
-structure) and a factor on the stated mu_d. Plan, sensors and what is hidden are the campaign's own; its noise is too where
-MuJoCo moves it. `left_by_truth`: of an empty campaign, what the true numbers leave a sample in each trial.
+structure) and a factor on the stated mu_d. Plan, sensors and hidden numbers are the campaign's own; noise is another.
+`left_by_truth`: of an empty campaign, what the true numbers leave a sample in each trial.
 """
 
 import json
