@@ -1,6 +1,7 @@
 """`hedgebed bench diagnose`: campaigns with something hidden in them, diagnosed; what was named, what was missed.
 
-    hedgebed bench diagnose [--kind penetration|tumble|rig|both|all|second-push|second-rig|second-tumble|second]
+    hedgebed bench diagnose [--kind penetration|tumble|rig|both|all|second-push|second-rig|second-tumble|second|
+                                    mujoco-tumble]
                             [--count 40] [--seed 1] [--only WHAT] [--trials N] [--structure STD] [--baselines yes|no]
                             [--out DIR]
 
@@ -51,8 +52,10 @@ _CODE = {
     ),
     "rig": ("benchmarks/hidden/rig.py", "benchmarks/hidden/rig_bed.py"),
     **dict.fromkeys(SECOND, ("benchmarks/second",)),
+    "mujoco-tumble": ("benchmarks/second", "benchmarks/soft"),
     "baselines": ("benchmarks/baseline/methods.py", "benchmarks/baseline/residuals.py"),
 }
+_SECRET = (*SECOND, "mujoco-tumble")  # kinds whose maker keeps a `benchmarks.second.drawing.Secret`
 _SEVERAL = {"both": ("penetration", "tumble"), "all": ("penetration", "tumble", "rig"), "second": tuple(SECOND)}
 
 
@@ -66,7 +69,8 @@ def run(
         out: folder of cases.jsonl, which grows as it goes, and is where it goes on.
         progress: what is done, and how long it has to go.
         kind: of campaigns: penetration, tumble, rig (penetrations of another maker), both (the first two) or all
-            three; second-push, second-rig, second-tumble or second (all three of the second simulator).
+            three; second-push, second-rig, second-tumble or second (all three of the second simulator). Or
+            mujoco-tumble, tumbles that MuJoCo moves.
         count: campaigns of each kind.
         seed: of the suite.
         only: hide this in every campaign; empty: the suite's mixture.
@@ -181,9 +185,9 @@ def _one(kind: str, case: Json, ask: Ask, limited: Limit | None, *, before: Json
         record = {
             "kind": kind, "case": case, "date": now(), "code": digest("code"), "suite": digest(kind),
             "truth": list(hidden.effects), "outside": hidden.outside, "signature": float(hidden.signature),
-            "true_parameters": hidden.parameters if kind == "tumble" or kind in SECOND else {},
+            "true_parameters": hidden.parameters if kind in ("tumble", *_SECRET) else {},
             "coloured": bool(hidden.coloured), "trials": len(campaign.tables.trial),
-            **({"hidden": hidden.extra} if kind == "rig" or kind in SECOND else {}),
+            **({"hidden": hidden.extra} if kind in ("rig", *_SECRET) else {}),
         } | said  # fmt: skip
     if wanted and "base_values" in record:
         with threadpool_limits(1):

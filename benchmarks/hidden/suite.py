@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.second.campaigns import KINDS as SECOND
+from benchmarks.soft import tumble as soft_tumble
 from experiments.campaign import Campaign, write_campaign
 from experiments.runs.types import Json
 
@@ -24,8 +25,9 @@ from . import tumble as hidden_tumble
 
 __all__ = ["KINDS", "STRENGTHS", "make_case", "suite", "write_suite"]
 
-KINDS = ("penetration", "tumble", "rig", *SECOND)
-"""Of made-up campaigns. Those of `rig` are penetrations of another maker; `second-...` are of the second simulator."""
+KINDS = ("penetration", "tumble", "rig", *SECOND, "mujoco-tumble")
+"""Of made-up campaigns. Those of `rig` are penetrations of another maker; `second-...` are of the second simulator,
+`mujoco-...` of MuJoCo."""
 STRENGTHS = (0.7, 50.0)  # signatures that are aimed at, over the noise: from not quite to be seen to plain
 
 _SHARES = {"effect": 0.53, "null": 0.22, "outside": 0.17, "pair": 0.08}
@@ -35,6 +37,7 @@ _MAKERS: dict[str, tuple[Any, Callable[..., tuple[Campaign, Any]]]] = {
     "tumble": (hidden_tumble, hidden_tumble.make_hidden_tumble),
     "rig": (hidden_rig, hidden_rig.make_rig),
     **{name: (kind, kind.make) for name, kind in SECOND.items()},
+    "mujoco-tumble": (soft_tumble, soft_tumble.make),
 }
 
 
