@@ -20,6 +20,7 @@ from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from functools import cache
+from importlib.util import find_spec
 from multiprocessing import active_children, get_context
 from pathlib import Path
 
@@ -91,6 +92,8 @@ def run(
         raise ValueError(f"trials = {trials}: 0 (6 to 24), or 4 to 100, was expected")
     if baselines not in ("yes", "no"):
         raise ValueError(f"baselines = {baselines!r}: yes or no was expected")
+    if kind == "mujoco-tumble" and find_spec("mujoco") is None:
+        raise ValueError("kind = 'mujoco-tumble': MuJoCo is not installed (pip install 'hedgebed[mujoco]')")
     kinds, size = _SEVERAL.get(kind, (kind,)), _size(structure)
     plans = {
         one: suite(one, count, seed=seed, only=only or None, trials=trials or None, structure=size) for one in kinds

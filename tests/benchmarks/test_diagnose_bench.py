@@ -218,6 +218,12 @@ def test_a_line_that_is_no_record_is_named(tmp_path):
         bench.read_cases(tmp_path)
 
 
+def test_campaigns_of_mujoco_without_it_are_refused_with_what_to_install(monkeypatch, tmp_path):
+    monkeypatch.setattr(bench, "find_spec", lambda name: None)
+    with pytest.raises(ValueError, match=r"mujoco-tumble.*hedgebed\[mujoco\]"):
+        bench.run(tmp_path, progress=Progress(), kind="mujoco-tumble")
+
+
 def test_options_that_a_benchmark_has_not_are_refused():
     assert benchmark_options(bench.run, {"count": "7", "kind": "tumble"}) == {"count": 7, "kind": "tumble"}
     with pytest.raises(ValueError, match="--cuont is no option here; did you mean 'count'"):
