@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .problem import Array, Model, Parameter, Values, Whitener, evaluate_all
+from .steps import along_corner, damped_step, solve
 
 __all__ = ["SCAN", "SEARCH", "Fit", "Linear", "Model", "Rule", "Whitener", "by_beginnings", "fit", "fit_each", "fits",
            "scanned", "settled", "settled_slopes"]  # fmt: skip
@@ -226,6 +227,7 @@ def _descent(model: Model, start: Values, rule: Rule) -> _Walk[Fit]:
     middle, precision = np.array([p.value for p in parameters]), np.array([p.std**-2 for p in parameters])
     x = np.clip(_numbers(parameters, start), low, high)
     names = [p.name for p in parameters]
+    corners = [(names.index(p.name), names.index(p.at_most)) for p in parameters if p.at_most in names]
     unturned = model.unturned  # modes are needed at the end only: steps follow from their products
 
     def named(values: Array) -> dict[str, float]:
@@ -254,18 +256,20 @@ def _descent(model: Model, start: Values, rule: Rule) -> _Walk[Fit]:
             trials = []
             for tried in rule.tries:
                 damped = tried.times * damping + tried.plus
-                step = _step(hessian, gradient, free, damped, (at_low, at_high), rule.bounded)
+                step = damped_step(hessian, gradient, free, damped, (at_low, at_high), rule.bounded)
                 trials.append(np.clip(x + tried.length * (scales * step), low, high))
+            trials += [np.clip(moved, low, high) for corner in corners for moved in along_corner(x, *corner)]
             modes = yield part, [named(trial) for trial in trials]
             objectives = [float(m @ m) + penalty(t) for m, t in zip(modes, trials, strict=True)]
             place = int(np.argmin(objectives))
             gain = objective - objectives[place]
             if gain > 0:
                 x, best = trials[place], modes[place].copy()  # the others of the batch are not kept
-                damping = max(damping * rule.tries[place].keep + rule.tries[place].then, rule.least)
+                if place < len(rule.tries):
+                    damping = max(damping * rule.tries[place].keep + rule.tries[place].then, rule.least)
             if gain >= (rule.enough + rule.relative * objective if whole else rule.early * objective):
                 continue
-            if gain <= 0 and damping < rule.last and gradient @ _solve(hessian, gradient) >= rule.enough:
+            if gain <= 0 and damping < rule.last and gradient @ solve(hessian, gradient) >= rule.enough:
                 damping = rule.last
                 continue
             if whole and scannable and objective - max(gain, 0.0) > rule.poor * np.count_nonzero(best):
@@ -277,23 +281,6 @@ def _descent(model: Model, start: Values, rule: Rule) -> _Walk[Fit]:
     if best is None:
         (best,) = yield unturned, [named(x)]
     return Fit(model, named(x), best, jacobian, float(best @ best), penalty(x), free)
-
-
-def _step(
-    hessian: Array, gradient: Array, free: NDArray[np.bool_], damping: float,
-    at_bounds: tuple[NDArray[np.bool_], NDArray[np.bool_]], times: int,
-) -> Array:  # fmt: skip
-    """The damped step of the free parameters, found so many `times`, what runs into a bound at once left out."""
-    for _ in range(times):
-        mine = hessian[np.ix_(free, free)]
-        diagonal = np.diag(np.maximum(np.diag(mine), 1e-12))
-        step = np.zeros(len(gradient))
-        step[free] = -_solve(mine + damping * diagonal, gradient[free])
-        blocked = free & ((at_bounds[0] & (step < 0)) | (at_bounds[1] & (step > 0)))
-        if not blocked.any() or (blocked == free).all():
-            break
-        free = free & ~blocked
-    return step
 
 
 def scanned(found: Fit, *, passes: int = _PASSES) -> Fit:
@@ -465,12 +452,6 @@ def _begun(model: Model, start: Values | None) -> Values:
 def _numbers(parameters: Sequence[Parameter], values: Values) -> Array:
     """Values of the parameters, their own where none is given."""
     return np.array([values.get(p.name, p.value) for p in parameters], dtype=float)
-
-
-def _solve(matrix: Array, right: Array) -> Array:
-    size = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
-    scaled = matrix / np.outer(size, size) + 1e-12 * np.eye(len(size))
-    return np.linalg.lstsq(scaled, right / size, rcond=1e-13)[0] / size
 
 
 def _slopes(model: Model, x: Array, known: Array | None = None) -> _Walk[tuple[Array, Array]]:

@@ -83,6 +83,31 @@ def test_a_jump_within_a_step_of_the_fit_is_no_slope():
     assert np.sqrt(settled(found).covariance()[0, 0]) == pytest.approx(exact, rel=1e-6)
 
 
+class Corner(Line):
+    """y = min(d, s) t, and y = 20 (s - d) t in the second half, where no row sticks: s is d."""
+
+    def __init__(self, at_most):
+        super().__init__()
+        self.slides = self.time < 50
+        self.measured = {
+            id: rows + (0.08 * self.slides - ~self.slides) * self.time for id, rows in self.measured.items()
+        }
+        (k,) = self.base
+        self.base = (replace(k, name="s"), replace(k, name="d", at_most=at_most))
+
+    def evaluate(self, points, forms, trials, share=1.0):
+        found = [(min(p["d"], p["s"]), p["s"]) for p in points]
+        models = [np.where(self.slides, d, 20 * (s - d)) * self.time for d, s in found]
+        return [{id: self.measured[id] - model for id in trials} for model in models]
+
+
+def test_a_fit_goes_along_the_corner_in_which_sliding_friction_is_as_large_as_static():
+    """Upwards d alone changes nothing, and s alone leaves the corner. The right s = d is 1.08, both are stated as 1."""
+    without, along = (fitted(Corner(at_most)) for at_most in ("", "s"))
+    assert along.values["s"] == pytest.approx(1.08, abs=2e-3) == along.values["d"]
+    assert along.chi_square < 1.2 * along.count < without.chi_square
+
+
 def test_a_number_that_the_campaign_excludes_is_said_and_no_right_model_needs_one():
     problem = Line(std=5e-3)
     assert open_gate(fitted(problem))[1].passed and not bounds_met(fitted(problem))
