@@ -1,13 +1,12 @@
 """Default preparation of a bed of each material, what is known of its strength, how densely it rains: recipes.toml."""
 
 import tomllib
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 from dem.grains.materials import Material
+from experiments.runs.types import Json
 
 __all__ = ["POURED_DRY", "Recipe", "recipe_of"]
 
@@ -38,7 +37,7 @@ def _recipes() -> dict[str, Recipe]:
     return {name: Recipe(**_frozen(table)) for name, table in tables.items()}
 
 
-def _frozen(table: Mapping[str, Any]) -> dict[str, Any]:
+def _frozen(table: Json) -> Json:
     """A table with tuples in place of lists."""
     return {key: tuple(value) if isinstance(value, list) else value for key, value in table.items()}
 
