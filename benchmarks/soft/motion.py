@@ -56,7 +56,7 @@ def move(numbers: Numbers, duration: float, *, contact: Contact = CONTACT, step:
     """Times [s], shape [row_count], and the motion, shape [row_count, 7], the last axis as `ROWS`.
 
     `numbers`: of the platform, the trial and what is hidden, by name. `duration`: after t = 0 [s]. Raises RuntimeError
-    where the motion is not finite, ImportError without MuJoCo.
+    where the motion is not stable, ImportError without MuJoCo.
     """
     import mujoco
 
@@ -86,8 +86,8 @@ def move(numbers: Numbers, duration: float, *, contact: Contact = CONTACT, step:
         if busy:
             data.qfrc_applied[:3], model.geom_friction[tips, 0] = _push(p, k * step, data, mu)
         mujoco.mj_step(model, data)
-    if not np.isfinite(out).all():
-        raise RuntimeError("the motion is not finite")
+    if not np.isfinite(out).all() or any(warning.number for warning in data.warning):
+        raise RuntimeError("the motion is not stable: MuJoCo warned, and began it again")
     return np.arange(count) * step * every, out
 
 
@@ -166,7 +166,9 @@ def _push(p: Numbers, t: float, data: "mujoco.MjData", mu: float) -> tuple[tuple
     y, turn = data.qpos[1:3].tolist()
     vx, vy, omega = data.qvel[:3].tolist()
     wheel = abs(data.qvel[3] + omega)
-    high, away = p["length"] * np.cos(_GAMMA + turn), p["length"] * np.sin(_GAMMA + turn)
+    radius = max(p.get("ball", 0.0), _POINT)
+    arm = p["length"] - radius  # to the centre of a tip's ball
+    high, away = arm * np.cos(_GAMMA + turn) + radius, arm * np.sin(_GAMMA + turn)
     touching, into, slide = high > y, np.maximum(-(vy + away * omega), 0.0), vx - high * omega
     press = np.where(touching, p.get("drag", 0.0) * into**2, 0.0)
     friction = mu * (1.0 - p.get("vibration", 0.0) * (1.0 - math.exp(-wheel / p.get("vibration_speed", 1.0))))

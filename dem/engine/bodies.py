@@ -29,7 +29,8 @@ class BedBodies(BedBase):
         Args:
             shape: one or several of dem's Ball, Cylinder, Cone, Capsule, Box, Tube, Polyhedron, Mesh, Plane and Placed,
                 in the body's frame. Their union is the body, and touches a grain once. What lies farther sideways from
-                the body's origin than half the bed's period touches nothing; it is warned of (UserWarning).
+                the body's origin than half the bed's period touches nothing. It is
+                warned of (UserWarning) as the body is put in, before it turns.
             position: of the body's origin [m].
             facing: as ``dem.Facing`` has it: friction, restitution, rolling_friction of a grain on the body, young [Pa]
                 and poisson of the body, surface_energy of the two [J/m2]. What is not given is the grains' own; without
@@ -40,7 +41,7 @@ class BedBodies(BedBase):
         """
         self.check_valid()
         body = self.place_body(shape, position, Facing(**facing))
-        self._warn_of_far_parts(shape, position)
+        self._warn_of_far_parts(shape, body)
         kept = self.max_overlap
         self.max_overlap = 0.0
         self.make_lists()
@@ -59,7 +60,7 @@ class BedBodies(BedBase):
         self.max_overlap = max(kept, found)
         return body
 
-    def _warn_of_far_parts(self, shape: Shape | Sequence[Shape], position: Sequence[float]) -> None:
+    def _warn_of_far_parts(self, shape: Shape | Sequence[Shape], body: int) -> None:
         """Warn of parts that no grain meets, because they lie farther sideways than half the bed's period.
 
         What spans the whole period lacks nothing.
@@ -69,8 +70,8 @@ class BedBodies(BedBase):
                 half, far = 0.5 * period * (1 + 1e-6), max(-low, high)
                 if far > half and min(-low, high) < half:
                     warnings.warn(
-                        f"a {type(part.bare).__name__} of the body at {tuple(position)} m reaches {far:.4g} m along "
-                        f"{name} from the body's origin. Beyond half the bed's period, {half:.4g} m, no grain touches "
+                        f"a {type(part.bare).__name__} of body {body} reaches {far:.4g} m along {name} from the body's "
+                        f"origin. Beyond half the bed's period, {half:.4g} m, no grain touches "
                         f"it: use a wider bed, or put the origin in the middle of the body",
                         stacklevel=3,
                     )

@@ -51,14 +51,17 @@ def check_lammps(settings: Any, material: "Material") -> None:
 
     Also where it refuses the cohesion of ``material``.
     """
-    from coupling.lammps import LammpsMissingError, check_cohesion, check_ranks
+    from coupling.lammps import LammpsMissingError, check_ranks, cohesion_fault
 
-    if settings.ground == "lammps":
-        try:
-            check_ranks(settings.ranks or 1)
-            check_cohesion(material.cohesion)
-        except LammpsMissingError as error:
-            raise ValueError(f"ground = 'lammps': {error}") from None
+    if settings.ground != "lammps":
+        return
+    try:
+        check_ranks(settings.ranks or 1)
+        refusal = cohesion_fault(material.cohesion)
+    except LammpsMissingError as error:
+        raise ValueError(f"ground = 'lammps': {error}") from None
+    if refusal is not None:
+        raise ValueError(f"material {material.name!r}: {refusal}; or use ground = 'bed'")
 
 
 def moved_to_lammps(

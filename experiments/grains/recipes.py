@@ -23,7 +23,6 @@ class Recipe:
     cohesion: float | None = None  # [Pa]; None: not known
     cohesion_std: float | None = None  # [Pa]; None: not known
     angle: float | None = None  # Friction angle at large strain [degrees]; None: as of the rolling friction
-    circle: float | None = None  # Peak angle of the Mohr's circle that gave the cohesion [degrees]; None: not known
     resistance: float | None = None  # What a tip meets for the cohesion alone [Pa]; None: not known
     footing: tuple[float, ...] | None = None  # Friction angles for a footing, least first [degrees]; None: not known
     packed: float | None = None  # Packing fraction of the real soil, where grains stick [1]; None: not known

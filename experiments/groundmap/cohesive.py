@@ -101,7 +101,10 @@ class CohesiveMap:
         return first + way * (last - first), math.hypot(off, way * math.log(self.law["within"]))
 
     def held(self, answer: Answer, *, load: float, gravity: float, diameter: float) -> Held | None:
-        """What the answer owes to the cohesion of the soil; None where its error contains the least cohesion (95 %).
+        """What the answer owes to the cohesion of the soil; None where its error contains what the least leaves.
+
+        The least cohesion is that at 95 %. What it leaves follows from K of the map, and from Terzaghi's formula for a
+        flat foot as wide.
 
         The part of K that cohesion carries is taken in proportion to it. ``load``: Of the sinkage [N]. ``gravity``:
         [m/s2]. ``diameter``: Of the tip [m].
@@ -113,11 +116,13 @@ class CohesiveMap:
         g, size = gravity / self.reference["gravity"], diameter / self.reference["diameter"]
         share = self.law["share"] * size / ((1 - self.law["share"]) * g * size**2 + self.law["share"] * size)
         softer = 1 - share + share * found.least / found.value
-        if 1 / softer <= 1 + answer.sinkage.half / answer.sinkage.value:
-            return None
         depths = footing_depths(stuff, load / (math.pi * diameter**2 / 4), gravity=gravity, diameter=diameter,
                                 cohesion=found.least)  # fmt: skip
-        ends = (load / (softer * answer.stiffness.value), *depths)
+        firm = load / answer.stiffness.value
+        ends = (firm / softer, *depths)
+        known = ends if firm <= self.deepest * diameter else ends[:1]  # beyond the map there is no sinkage to compare
+        if max(known) <= firm * (1 + answer.sinkage.half / answer.sinkage.value):
+            return None
         return Held(found, share, load, (min(ends), max(ends)))
 
     def words(self, answer: Answer, *, gravity: float, diameter: float) -> list[str]:

@@ -86,7 +86,8 @@ def answer(findings: Findings, material: Any) -> Json | None:
     return {
         "comes_to_rest": False, "at_any_depth_of_the_foot": not never, "load": load, "foot": settings.foot,
         "depth": depths[0], "depth_range": [low, high], "depth_expected": expected.depth(load),
-        "depth_formula": list(formula), "stiffness": stiffness, "stiffness_plate": plate,
+        "depth_formula": list(formula) if material.cohesion == "none" else None,
+        "stiffness": stiffness, "stiffness_plate": plate,
         "friction_angle": angles[0], "cohesion_enough": enough[0], "cohesions_enough": enough, "cohesions": rows,
         "sentences": sentences, "source": say("terzaghi"), **({} if beside is None else {"beside": beside}),
     }  # fmt: skip

@@ -56,6 +56,26 @@ def test_the_motion_imports_nothing_from_rigid_coupling_or_experiments():
     subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True)
 
 
+def test_a_motion_that_mujoco_begins_again_is_an_error(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)  # MuJoCo writes its log into the present folder
+    with pytest.raises(RuntimeError, match="not stable"):
+        moved(0.1, torque=1e12)
+
+
+def test_a_drag_acts_on_all_tips_that_touch_whether_points_or_balls():
+    """Tips that the platform's weight presses in by z_0 at rest, given a speed: drag is D v^2 on each that goes in."""
+    import mujoco
+
+    for ball in (0.0, 8e-3):
+        p = BASE | {"length": 0.2, "drag": 3.0, "ball": ball}
+        radius = max(ball, 1e-5)
+        y = (0.2 - radius) * math.cos(math.pi / 8) + radius - 1e-5
+        data = mujoco.MjData(mujoco.MjModel.from_xml_string(motion._mjcf(p | {"wheel_inertia": 1.2e-3}, CONTACT, 1e-4)))
+        data.qpos[1], data.qvel[1] = y, -0.3
+        (_, force, torque), _ = motion._push(p, 0.0, data, 0.5)
+        assert force == pytest.approx(2 * 3.0 * 0.3**2) and torque == pytest.approx(0.0, abs=1e-12)
+
+
 def test_a_platform_at_rest_sinks_by_half_its_weight_over_the_stiffness_and_stays():
     m = moved(0.2)
     assert FLAT - m["y"] == pytest.approx(np.full(len(m["y"]), 0.5 * 0.53 / 1.5e4), rel=1e-5)

@@ -83,7 +83,10 @@ def wheel(tmp_path_factory):
 
 
 def test_the_wheel_has_every_data_file_and_only_the_documented_top_level_names(wheel):
-    inside = set(zipfile.ZipFile(wheel).namelist())
+    with zipfile.ZipFile(wheel) as archive:
+        inside = set(archive.namelist())
+        (points,) = (archive.read(name).decode() for name in inside if name.endswith("entry_points.txt"))
+    assert "bed=vis.view.notebook:html_of_bed" in points.replace(" ", "")  # what a notebook shows
     assert {name.split("/")[0] for name in inside if ".dist-info" not in name} == TOP
     tracked = subprocess.run(["git", "ls-files", *TOP], cwd=ROOT, capture_output=True, text=True, check=True).stdout
     assert set(tracked.split()) - inside == set()

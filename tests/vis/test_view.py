@@ -237,8 +237,10 @@ def test_a_bed_as_the_last_line_of_a_cell_shows_itself(monkeypatch):
     arrays = {"position": np.random.default_rng(1).random((30, 3)), "radius": np.full(30, 0.01), "id": np.arange(30)}
     bed = SimpleNamespace(time=0.5, grains=lambda: SimpleNamespace(as_dict=lambda: arrays))
     assert Bed._repr_html_(bed).startswith("<iframe")
+    bed.grains = lambda: (_ for _ in ()).throw(RuntimeError("the bed is of an earlier start of Taichi"))
+    assert Bed._repr_html_(bed) is None
     monkeypatch.setattr("dem.shown.entry_points", lambda **which: ())
-    assert Bed._repr_html_(bed) is None  # without a package that draws, a notebook shows the text
+    assert Bed._repr_html_(bed) is None  # without a package that draws, too: a notebook shows the text
 
 
 def test_a_run_of_a_script_as_the_last_line_of_a_cell_shows_its_curve():

@@ -119,10 +119,18 @@ def _title(home: Path) -> tuple[str, list[str]]:
     title = with_squares(str(result.get("title") or f"Run in {home.resolve().name}"))
     lead = [f"hedgebed {result['version']}"] if "version" in result else []
     surface = str(result.get("surface") or settings.get("material") or settings.get("surface") or "")
-    named = bool(surface) and not surface[0].isdigit() and surface[0] != "-"  # The run of a script states a height [m]
+    named = bool(surface) and not _is_number(surface)  # the run of a script states a height [m]
     lead += [str(result.get("experiment") or "no result yet"), *([f"surface: {surface}"] if named else [])]
     lead += [f"folder: {home.resolve().name}", *([f"status: {run.status}"] if run.status != "done" else [])]
     return title, lead
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
 
 
 def _head(scenes: Sequence[Packed], title: str, live: float = 0.0) -> str:

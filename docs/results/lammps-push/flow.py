@@ -53,7 +53,10 @@ def start_of(asked, seed):
     ]
     away = np.hypot(grains.position[:, None, 0] % asked.size[0] - places, grains.position[:, None, 2]).min(axis=1)
     free = away > radius + grains.radius
-    kept = asked.out.with_name(f"start-{seed}.npz")  # our law makes it, so that terms of LAMMPS' law find it made
+    sizes = "-".join(f"{1e3 * length:g}" for length in (*asked.size, asked.grain))
+    kept = asked.out.with_name(
+        f"start-{seed}-{sizes}.npz"
+    )  # our law makes it, so that terms of LAMMPS' law find it made
     if kept.exists():
         return piece.material, SimpleNamespace(**np.load(kept)), bars, piece.time_step
     bed = made(piece.material, grains.position[free], grains.radius[free], None, None, asked, piece.time_step)

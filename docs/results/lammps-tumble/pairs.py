@@ -4,7 +4,7 @@
 
 Contacts begin without history in both, and the grains do not come to rest in LAMMPS first, so that both begin from the
 same grains. Adds two rows for each seed to OUT/pairs.csv, with the numbers at the end, and writes the motion of each
-run to OUT/motion-SEED-bed.csv and OUT/motion-SEED-lammps.csv.
+run to OUT/motion-SEED-bed.csv and OUT/motion-SEED-lammps.csv. `own_processor_s` is hedgebed's, without LAMMPS'.
 """
 
 import csv
@@ -23,7 +23,7 @@ from same import from_fresh_grains, settings_of
 from experiments import tumble
 
 COLUMNS = ("t_s", "theta_rad", "x_m", "y_m")
-HEAD = ("seed", "ground", "rotation_rad", "ahead_mm", "rise_mm", "angle_deg", "deepest_mm", "processor_s")
+HEAD = ("seed", "ground", "rotation_rad", "ahead_mm", "rise_mm", "angle_deg", "deepest_mm", "own_processor_s")
 
 
 def numbers(seed: int, kind: str, given: dict[str, Any], out: Path) -> tuple[Any, ...]:
@@ -37,9 +37,10 @@ def numbers(seed: int, kind: str, given: dict[str, Any], out: Path) -> tuple[Any
     begin = int(np.argmax(time_s >= 0.0))
     np.savetxt(out / f"motion-{seed}-{kind}.csv", rows[::10], delimiter=",", fmt="%.7g", header=",".join(COLUMNS))
     found = json.loads((folder / "result.json").read_text(encoding="utf-8"))["quantities"]
+    angle = found["trajectory_angle"]["value"]
     return (
         seed, kind, float(theta[-1] - theta[begin]), 1e3 * float(x[-1] - x[begin]), 1e3 * float(y[-1] - y[begin]),
-        math.degrees(found["trajectory_angle"]["value"] or math.nan), 1e3 * found["sinkage_largest"]["value"], taken,
+        math.degrees(math.nan if angle is None else angle), 1e3 * found["sinkage_largest"]["value"], taken,
     )  # fmt: skip
 
 

@@ -227,7 +227,7 @@ def _descent(model: Model, start: Values, rule: Rule) -> _Walk[Fit]:
     middle, precision = np.array([p.value for p in parameters]), np.array([p.std**-2 for p in parameters])
     x = np.clip(_numbers(parameters, start), low, high)
     names = [p.name for p in parameters]
-    corners = [(names.index(p.name), names.index(p.at_most)) for p in parameters if p.at_most in names]
+    corners = [(names.index(p.name), names.index(p.bounded_by)) for p in parameters if p.bounded_by in names]
     unturned = model.unturned  # modes are needed at the end only: steps follow from their products
 
     def named(values: Array) -> dict[str, float]:

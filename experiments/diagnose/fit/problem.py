@@ -65,7 +65,7 @@ class Parameter:
     once when a Jacobian is made, since none touches another's trial."""
     step: float | None = None
     """Step of finite differences, in units of the parameter; for models whose contacts make small steps rough."""
-    at_most: str = ""  # name of the parameter above which it changes nothing (mu_d: mu_s)
+    bounded_by: str = ""  # name of the parameter above which it changes nothing (mu_d: mu_s)
     least: float | None = None
     """Of what may differ between replicates: the std below which it is negligible; None: the problem's own."""
 

@@ -100,7 +100,7 @@ class TumbleProblem(Problem):
 
         shared = [(name, self.forward.nominal[name], getattr(stated, name)) for name in SHARED]
         found = [uncertain(name, _UNITS[name], value, s) for name, value, s in shared if s > 0 and value > 0]
-        found = [replace(p, at_most="mu_s") if p.name == "mu_d" else p for p in found]
+        found = [replace(p, bounded_by="mu_s") if p.name == "mu_d" else p for p in found]
         if (sigma := stated.gravity_sim) > 0:
             found += [uncertain(f"gravity_sim[{t.id}]", "m/s2", t.gravity_sim, sigma, trial=t.id, kind="gravity_sim")
                       for t in self.data.trials]  # fmt: skip

@@ -104,7 +104,7 @@ def test_parts_that_no_grain_can_meet_are_warned_of():
     """A grain is sought within half the period of the body's origin (as images in molecular dynamics)."""
     bed = grains_at((0.01, 0.01, 0.05))
     far = Capsule((0.030, -0.005, 0.0), (0.030, 0.005, 0.0), 0.001)
-    with pytest.warns(UserWarning, match=r"a Capsule .* reaches 0\.031 m along x .*period, 0\.0225 m"):
+    with pytest.warns(UserWarning, match=r"a Capsule of body \d+ reaches 0\.031 m along x .*period, 0\.0225 m"):
         bed.add_body([Ball(radius=0.003), far], position=(0.02, 0.02, 0.0))
     with warnings.catch_warnings():
         warnings.simplefilter("error")

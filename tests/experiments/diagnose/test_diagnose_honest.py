@@ -86,14 +86,14 @@ def test_a_jump_within_a_step_of_the_fit_is_no_slope():
 class Corner(Line):
     """y = min(d, s) t, and y = 20 (s - d) t in the second half, where no row sticks: s is d."""
 
-    def __init__(self, at_most):
+    def __init__(self, bounded_by):
         super().__init__()
         self.slides = self.time < 50
         self.measured = {
             id: rows + (0.08 * self.slides - ~self.slides) * self.time for id, rows in self.measured.items()
         }
         (k,) = self.base
-        self.base = (replace(k, name="s"), replace(k, name="d", at_most=at_most))
+        self.base = (replace(k, name="s"), replace(k, name="d", bounded_by=bounded_by))
 
     def evaluate(self, points, forms, trials, share=1.0):
         found = [(min(p["d"], p["s"]), p["s"]) for p in points]
@@ -103,7 +103,7 @@ class Corner(Line):
 
 def test_a_fit_goes_along_the_corner_in_which_sliding_friction_is_as_large_as_static():
     """Upwards d alone changes nothing, and s alone leaves the corner. The right s = d is 1.08, both are stated as 1."""
-    without, along = (fitted(Corner(at_most)) for at_most in ("", "s"))
+    without, along = (fitted(Corner(bounded_by)) for bounded_by in ("", "s"))
     assert along.values["s"] == pytest.approx(1.08, abs=2e-3) == along.values["d"]
     assert along.chi_square < 1.2 * along.count < without.chi_square
 

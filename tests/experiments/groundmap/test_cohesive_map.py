@@ -134,7 +134,7 @@ def test_another_tip_than_the_one_of_the_runs_is_said_to_be_scaled(tmp_path):
     assert "similarity" not in words("same", gravity=1.0)
 
 
-@pytest.mark.parametrize(("gravity", "load"), [(EARTH, 0.5), (1.62, 0.5), (0.1 * EARTH, 0.5), (1e-3 * EARTH, 0.5)])
+@pytest.mark.parametrize(("gravity", "load"), [(EARTH, 0.1), (EARTH, 0.5), (1.62, 0.5), (1e-3 * EARTH, 0.5)])
 def test_a_sinkage_that_only_cohesion_gives_stands_beside_the_one_without_it(gravity, load, tmp_path):
     """K = exp(..) (w + s D / D0) with w = (1 - s) g / g0 (D / D0)^2: w alone is left where cohesion is 0, as its 95 %
     interval of 24 ± 20 Pa allows. Terzaghi's depth is (p - 0.3 w' D N_gamma) / (w' N_q), w' = 0.563 * 2900 kg/m3 g,
@@ -145,17 +145,17 @@ def test_a_sinkage_that_only_cohesion_gives_stands_beside_the_one_without_it(gra
     weight = (1 - share) * gravity / EARTH * size**2
     ratio = (weight + share * size) / weight  # of the sinkages without and with cohesion
     stated = numbers["sinkage"]
-    matters = ratio > 1 + 1.959964 * stated["std"] / stated["value"]
-    assert matters == (gravity < 1.0)
+    of_soil, pressure = 0.563 * 2900 * gravity, load / (math.pi * 0.008**2)
+    formula = [max(0.0, pressure - 0.3 * of_soil * 0.016 * by_width) / (of_soil * by_depth)
+               for by_width, by_depth in ((22.02, 23.18), (873.9, 319.1))]  # fmt: skip
+    ends = [*formula, ratio * stated["value"]]
+    matters = max(ends) > stated["value"] + 1.959964 * stated["std"]
+    assert matters == (load > 0.2)
     fitted = read_ground(tmp_path / "run" / "ground.toml")
     rows = dict(row[:2] for row in rows_of(result))
     assert len(fitted.notes) == 1 + matters and any("holds" in row for row in rows) == matters
     assert ("sinkage_without_cohesion" in numbers) == matters == ("95 %)" in result["warnings"][0])
     if matters:
-        of_soil, pressure = 0.563 * 2900 * gravity, load / (math.pi * 0.008**2)
-        formula = [max(0.0, pressure - 0.3 * of_soil * 0.016 * by_width) / (of_soil * by_depth)
-                   for by_width, by_depth in ((22.02, 23.18), (873.9, 319.1))]  # fmt: skip
-        ends = [*formula, ratio * stated["value"]]
         low, high = (numbers[f"sinkage_without_cohesion{end}"]["value"] for end in ("", "_most"))
         assert (low, high) == (pytest.approx(min(ends), rel=2e-3), pytest.approx(max(ends), rel=2e-3))
 

@@ -151,7 +151,8 @@ def test_a_load_that_sinks_the_spike_beyond_the_map_leaves_the_law_and_no_sinkag
     heavy, own = (json.loads((tmp_path / name / "result.json").read_text("utf-8")) for name in ("heavy", "own"))
     assert heavy["quantities"]["sinkage"]["value"] is None and heavy["quantities"]["load"]["value"] == 500.0
     assert heavy["quantities"]["stiffness"]["value"] == own["quantities"]["stiffness"]["value"]
-    assert read_ground(tmp_path / "heavy" / "ground.toml") == read_ground(tmp_path / "own" / "ground.toml")
+    files = [read_ground(tmp_path / name / "ground.toml") for name in ("heavy", "own")]
+    assert files[0].parameters == files[1].parameters and files[0].range == files[1].range
     (said,) = [said for said in heavy["warnings"] if "sinkage" in said and "500 N" in said]
     assert "not known" in said
     assert "not known" in (tmp_path / "heavy" / "report.html").read_text("utf-8")
