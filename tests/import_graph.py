@@ -1,11 +1,13 @@
 """Which module of ours imports which, read from the syntax trees."""
 
 import ast
+import subprocess
+import sys
 from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
-__all__ = ["FOLDERS", "ROOT", "circle", "folder_of", "graph_of", "imported", "modules"]
+__all__ = ["FOLDERS", "ROOT", "circle", "folder_of", "graph_of", "imported", "loaded_with", "modules"]
 
 ROOT = Path(__file__).resolve().parents[1]
 FOLDERS = ("dem", "rigid", "coupling", "experiments", "vis")
@@ -58,3 +60,13 @@ def graph_of(root: Path = ROOT) -> dict[str, set[str]]:
 def folder_of(name: str, known: dict[str, Path]) -> str:
     """The package whose folder holds the module's file."""
     return name if known[name].name == "__init__.py" else name.rpartition(".")[0]
+
+
+def loaded_with(*names: str) -> set[str]:
+    """The packages that Python has loaded once these modules are imported, in a process of its own."""
+    code = f"import sys, {', '.join(names)}; print(*{{name.split('.')[0] for name in sys.modules}})"
+    return set(
+        subprocess.run(
+            [sys.executable, "-c", code], cwd=ROOT, check=True, capture_output=True, text=True
+        ).stdout.split()
+    )

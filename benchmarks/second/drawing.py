@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Made", "Numbers", "Secret", "Table", "at_strength", "draw_case", "softness_for"]
+__all__ = ["Made", "Numbers", "Secret", "Table", "at_strength", "draw_case", "draw_names", "softness_for"]
 
 Array = NDArray[np.float64]
 Numbers = dict[str, float]
@@ -56,6 +56,11 @@ def draw_case(
         raise ValueError(f"kind = {kind!r}: null, pair, {', '.join((*effects, *outside))} was expected")
     strength = strength if strength is not None else math.exp(random.uniform(*map(math.log, _STRENGTHS)))
     return kind, strength, structure if structure is not None else math.exp(random.uniform(*np.log(_STRUCTURE)))
+
+
+def draw_names(random: np.random.Generator, kind: str, effects: Sequence[str]) -> tuple[str, ...]:
+    """What is hidden: two effects of a pair, drawn; else the one."""
+    return tuple(str(e) for e in random.choice(effects, 2, replace=False)) if kind == "pair" else (kind,)
 
 
 def softness_for(size: float, tried: Array, sizes: Sequence[float], *, least: float) -> float:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from .drawing import Made, Numbers, Secret, Table, at_strength, draw_case, softness_for
+from .drawing import Made, Numbers, Secret, Table, at_strength, draw_case, draw_names, softness_for
 from .noise import Noise, draw_noise
 
 __all__ = ["EFFECTS", "OUTSIDE", "Law", "fall", "make_push"]
@@ -118,7 +118,7 @@ def make_push(
     """
     random = np.random.default_rng((seed, 26))
     kind, strength, size = draw_case(random, kind, strength, structure, effects=EFFECTS, outside=OUTSIDE)
-    names = tuple(str(e) for e in random.choice(EFFECTS, 2, replace=False)) if kind == "pair" else (kind,)
+    names = draw_names(random, kind, EFFECTS)
     plan = _draw_plan(random, names, trials)
     plan, reached = _with_structure(random, plan, size)
     bare, slopes = _slopes(plan)

@@ -13,9 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .drawing import Made, Numbers, Table
-from .noise import Noise
+from .noise import Noise, draw_noise
 
-__all__ = ["CHANNELS", "RATES", "SIGMA", "SIGMA_GRAVITY", "Plan", "Readings", "Weighing", "read", "record", "weigh"]
+__all__ = [
+    "CHANNELS", "RATES", "SIGMA", "SIGMA_GRAVITY", "Plan", "Readings", "Weighing", "draw_conditions", "draw_sensors",
+    "draw_true", "read", "record", "weigh",
+]  # fmt: skip
 
 Array = NDArray[np.float64]
 Readings = list[dict[str, Array]]
@@ -42,6 +45,33 @@ class Plan:
     noise: dict[str, Noise]
     phase: dict[str, float]  # of each sensor's first sample, in samples
     legs: dict[str, float] = field(default_factory=dict)
+
+
+def draw_true(random: np.random.Generator, stated: Numbers) -> Numbers:
+    """The true numbers beside the stated ones, as uncertain as is stated; at most 2.5 standard deviations away."""
+    return {name: value * (1 + SIGMA[name] * float(np.clip(random.standard_normal(), -2.5, 2.5)))
+            for name, value in stated.items()}  # fmt: skip
+
+
+def draw_conditions(
+    random: np.random.Generator, gravities: Sequence[float] | None = None
+) -> list[tuple[float, float, str, float]]:
+    """Gravity [m/s2], torque [N m], actuator and speed of the wheel [rad/s]: two motors and a brake in each gravity."""
+    gravities = gravities or random.choice((0.03, 0.06, 0.1, 0.15), 2, replace=False).tolist()
+    motors = random.choice((0.125, 0.16, 0.22, 0.3), 2, replace=False).tolist()
+    brake, spin = float(random.choice((2.0, 4.0, 6.0))), float(random.choice((200.0, 300.0, 400.0)))
+    return [(g, t, "motor", 0.0) for g in gravities for t in motors] + [(g, brake, "brake", spin) for g in gravities]
+
+
+def draw_sensors(
+    random: np.random.Generator, loud: float
+) -> tuple[dict[str, float], dict[str, Noise], dict[str, float]]:
+    """Standard deviation of each channel, `loud` times the usual one, its noise, and the phase of each sensor."""
+    std = {"x": 5e-4, "y": 5e-4, "theta": 3e-3, "gyro": 0.01, "ax": 0.02, "ay": 0.02, "wheel": 0.5}
+    return (
+        {name: round(value * loud, 6) for name, value in std.items()}, {name: draw_noise(random) for name in CHANNELS},
+        {name: float(random.random()) for name in RATES},
+    )  # fmt: skip
 
 
 class Weighing:

@@ -7,16 +7,16 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
-from .drawing import Made, Numbers, Secret, at_strength, draw_case, softness_for
+from .drawing import Made, Numbers, Secret, at_strength, draw_case, draw_names, softness_for
 from .forms import FREE, NAMED, OUTSIDE, RIG, Form, draw_form
 from .motion import COLUMNS, move
-from .noise import draw_noise
-from .sensing import CHANNELS, RATES, SIGMA, SIGMA_GRAVITY, Plan, Readings, read, record, weigh
+from .sensing import SIGMA_GRAVITY, Plan, Readings, draw_conditions, draw_sensors, draw_true, read, record, weigh
 
-__all__ = ["make_tumble"]
+__all__ = ["make_tumble", "secret_of"]
 
 Random = np.random.Generator
 _G = 9.80665
@@ -50,7 +50,7 @@ def make_tumble(
             break
         other = _with_structure(random, _draw_plan(random, rig, trials), size)
         plan, reached = min((plan, reached), other, key=lambda pair: abs(math.log(max(pair[1], 1e-9) / size)))
-    names = tuple(str(e) for e in random.choice(named, 2, replace=False)) if kind == "pair" else (kind,)
+    names = draw_names(random, kind, named)
     forms = [_form(random, plan, name) for name in names if kind != "null"]
     clean, weighing = weigh(plan, partial(_measure, plan))
 
@@ -60,17 +60,26 @@ def make_tumble(
     chosen = [at_strength(form.at, signatures, strength, span=_SPAN, count=_LADDER) for form in forms]
     settings = {name: value for numbers, _ in chosen for name, value in numbers.items()}
     made = _measure(plan, [settings])[0] if chosen else clean
-    outside = kind if kind in OUTSIDE else None
-    effects = () if kind == "null" or outside else names
-    parameters = {key: float(of(settings)) for name in effects for key, of in NAMED.get(name, {}).items()}
-    secret = Secret(
-        effects, outside, parameters, min((seen for _, seen in chosen), default=0.0),
-        any(noise.kind == "coloured" for noise in plan.noise.values()), len(plan.trials),
-        {"structure": reached, "legs": plan.legs, "each": [seen for _, seen in chosen], "settings": settings,
-         "surface": plan.surface, "noise": {name: noise.kind for name, noise in plan.noise.items()},
-         "base": plan.true},
+    secret = secret_of(
+        plan, () if kind in ("null", *OUTSIDE) else names, chosen, settings, outside=kind if kind in OUTSIDE else None,
+        structure=reached, legs=plan.legs,
     )  # fmt: skip
     return record(random, plan, made, title="second"), secret
+
+
+def secret_of(
+    plan: Plan, effects: tuple[str, ...], chosen: Sequence[tuple[Numbers, float]], settings: Numbers,
+    *, outside: str | None, **more: Any,
+) -> Secret:  # fmt: skip
+    """What is hidden in tumbles. `chosen`: numbers and signature of each effect. `more`: of the maker."""
+    each = [seen for _, seen in chosen]
+    parameters = {key: float(of(settings)) for name in effects for key, of in NAMED.get(name, {}).items()}
+    return Secret(
+        effects, outside, parameters, min(each, default=0.0),
+        any(noise.kind == "coloured" for noise in plan.noise.values()), len(plan.trials),
+        {**more, "each": each, "settings": settings, "surface": plan.surface,
+         "noise": {name: noise.kind for name, noise in plan.noise.items()}, "base": plan.true},
+    )  # fmt: skip
 
 
 def _draw_plan(random: Random, rig: bool, trials: int | None) -> Plan:
@@ -78,14 +87,8 @@ def _draw_plan(random: Random, rig: bool, trials: int | None) -> Plan:
     k, c, mu = _SURFACES[surface]
     stated = {"mass": 5.3, "inertia": 0.06, "stiffness": k, "damping": c, "mu_s": mu, "mu_d": 0.5 * mu}
     stated = {name: round(value * float(random.uniform(0.9, 1.1)), 4) for name, value in stated.items()}
-    true = {name: value * (1 + SIGMA[name] * float(np.clip(random.standard_normal(), -2.5, 2.5)))
-            for name, value in stated.items()}  # fmt: skip
-    gravities = (0.0834, 0.147) if rig else tuple(random.choice((0.03, 0.06, 0.1, 0.15), 2, replace=False).tolist())
-    motors = random.choice((0.125, 0.16, 0.22, 0.3), 2, replace=False).tolist()
-    brake, spin = float(random.choice((2.0, 4.0, 6.0))), float(random.choice((200.0, 300.0, 400.0)))
-    conditions = [(g, t, "motor", 0.0) for g in gravities for t in motors] + [
-        (g, brake, "brake", spin) for g in gravities
-    ]
+    true = draw_true(random, stated)
+    conditions = draw_conditions(random, (0.0834, 0.147) if rig else None)
     count = trials or int(random.choice((6, 8, 8, 8, 12)))
     until = float(random.choice((10.0, 0.8)))
     own = tuple(
@@ -94,11 +97,9 @@ def _draw_plan(random: Random, rig: bool, trials: int | None) -> Plan:
         for g, torque, actuator, speed in (conditions[n % len(conditions)] for n in range(count))
     )  # fmt: skip
     loud = float(random.choice((0.7, 1.0, 1.5)))
-    std = {"x": 5e-4, "y": 5e-4, "theta": 3e-3, "gyro": 0.01, "ax": 0.02, "ay": 0.02, "wheel": 0.5}
     return Plan(
         rig, surface, stated, true, 1 + SIGMA_GRAVITY * np.clip(random.standard_normal(count), -2.5, 2.5), own,
-        float(random.choice((1.5, 2.0))), {name: round(value * loud, 6) for name, value in std.items()},
-        {name: draw_noise(random) for name in CHANNELS}, {name: float(random.random()) for name in RATES},
+        float(random.choice((1.5, 2.0))), *draw_sensors(random, loud),
     )  # fmt: skip
 
 

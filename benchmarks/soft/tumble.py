@@ -12,21 +12,20 @@ import numpy as np
 
 import benchmarks.second.motion as second
 from benchmarks.second.campaigns import campaign_of
-from benchmarks.second.drawing import Made, Numbers, Secret, draw_case
-from benchmarks.second.forms import NAMED
-from benchmarks.second.noise import draw_noise
+from benchmarks.second.drawing import Made, Numbers, Secret, draw_case, draw_names
 from benchmarks.second.sensing import (
-    CHANNELS,
-    RATES,
-    SIGMA,
     SIGMA_GRAVITY,
     Plan,
     Readings,
     Weighing,
+    draw_conditions,
+    draw_sensors,
+    draw_true,
     read,
     record,
     weigh,
 )
+from benchmarks.second.tumble import secret_of
 from experiments.campaign import Campaign
 
 from .forms import EFFECTS, OUTSIDE, SENSED, draw_form
@@ -62,19 +61,14 @@ def make_soft(
     random = np.random.default_rng((seed, 51))
     kind, strength, _ = draw_case(random, kind, strength, None, effects=EFFECTS, outside=OUTSIDE)
     plan, bench, (clean, weighing), structure = _near(random, trials, contact)
-    names = tuple(str(e) for e in random.choice(EFFECTS, 2, replace=False)) if kind == "pair" else (kind,)
+    names = draw_names(random, kind, EFFECTS)
     forms = [_form(random, plan, name) for name in names if kind != "null"]
     chosen = [_at_strength(form, bench, weighing, strength) for form in forms]
     settings = {name: value for numbers, _ in chosen for name, value in numbers.items()}
     made = bench.measure([settings])[0] if chosen else clean
-    outside = kind if kind in OUTSIDE else None
-    effects = () if kind == "null" or outside else names
-    parameters = {key: float(of(settings)) for name in effects for key, of in NAMED.get(name, {}).items()}
-    secret = Secret(
-        effects, outside, parameters, min((seen for _, seen in chosen), default=0.0),
-        any(noise.kind == "coloured" for noise in plan.noise.values()), len(plan.trials),
-        {"structure": structure, "each": [seen for _, seen in chosen], "settings": settings, "surface": plan.surface,
-         "noise": {name: noise.kind for name, noise in plan.noise.items()}, "base": plan.true},
+    secret = secret_of(
+        plan, () if kind in ("null", *OUTSIDE) else names, chosen, settings, outside=kind if kind in OUTSIDE else None,
+        structure=structure,
     )  # fmt: skip
     return record(random, plan, made, title="soft"), secret
 
@@ -103,12 +97,17 @@ def _of_base_model(plan: Plan) -> Readings:
     lanes, pulls = [], []
     for trial, factor in zip(plan.trials, plan.gravity_factor, strict=True):
         pulls.append(trial["gravity_sim"] * float(factor))
-        given = {"length": 0.2, "wheel_inertia": 1.2e-3, "shear_stiffness": 1e6, "shear_damping": 1e3,
-                 **plan.true, **trial, "gravity_sim": pulls[-1], "gravity_local": pulls[-1],
-                 "wheel_sign": 1.0 if trial["actuator"] == "motor" else -1.0}  # fmt: skip
-        lanes.append([float(given.get(name, 0.0)) for name in second.COLUMNS])
-    time, motions = second.move(np.array(lanes), plan.duration + 0.2)
+        lanes.append({**plan.true, **trial, "gravity_sim": pulls[-1],
+                      "wheel_sign": 1.0 if trial["actuator"] == "motor" else -1.0})  # fmt: skip
+    time, motions = move_base_model(lanes, plan.duration + 0.2)
     return [read(plan, time, motion, pull, {}) for motion, pull in zip(motions, pulls, strict=True)]
+
+
+def move_base_model(lanes: Sequence[Mapping[str, Any]], duration: float) -> tuple[np.ndarray, np.ndarray]:
+    """Times [s] and the motions of the planar model by the second simulator, without its structure, of each lane."""
+    rigid = {"length": 0.2, "wheel_inertia": 1.2e-3, "shear_stiffness": 1e6, "shear_damping": 1e3}
+    given = [{**rigid, **lane, "gravity_local": lane["gravity_sim"]} for lane in lanes]
+    return second.move(np.array([[float(one.get(name, 0.0)) for name in second.COLUMNS] for one in given]), duration)
 
 
 class _Bench:
@@ -154,16 +153,10 @@ def _draw_plan(random: Random, trials: int | None) -> Plan:
     k, c, mu = _SURFACES[surface]
     stated = {"mass": 5.3, "inertia": 0.06, "stiffness": k, "damping": c, "mu_s": mu}
     stated = {name: round(value * float(random.uniform(0.9, 1.1)), 4) for name, value in stated.items()}
-    true = {name: value * (1 + SIGMA[name] * float(np.clip(random.standard_normal(), -2.5, 2.5)))
-            for name, value in stated.items()}  # fmt: skip
+    true = draw_true(random, stated)
     for own in (stated, true):  # MuJoCo has one coefficient of friction
         own["mu_d"] = own["mu_s"]
-    gravities = random.choice((0.03, 0.06, 0.1, 0.15), 2, replace=False).tolist()
-    motors = random.choice((0.125, 0.16, 0.22, 0.3), 2, replace=False).tolist()
-    brake, spin = float(random.choice((2.0, 4.0, 6.0))), float(random.choice((200.0, 300.0, 400.0)))
-    conditions = [(g, t, "motor", 0.0) for g in gravities for t in motors] + [
-        (g, brake, "brake", spin) for g in gravities
-    ]
+    conditions = draw_conditions(random)
     count = trials or 6
     until = float(random.choice((10.0, 0.8)))
     own_trials = tuple(
@@ -171,11 +164,9 @@ def _draw_plan(random: Random, trials: int | None) -> Plan:
         for g, torque, actuator, speed in (conditions[n % len(conditions)] for n in range(count))
     )
     loud = float(random.choice((0.7, 1.0, 1.5)))
-    std = {"x": 5e-4, "y": 5e-4, "theta": 3e-3, "gyro": 0.01, "ax": 0.02, "ay": 0.02, "wheel": 0.5}
     return Plan(
         False, surface, stated, true, 1 + SIGMA_GRAVITY * np.clip(random.standard_normal(count), -2.5, 2.5),
-        own_trials, _DURATION, {name: round(value * loud, 6) for name, value in std.items()},
-        {name: draw_noise(random) for name in CHANNELS}, {name: float(random.random()) for name in RATES},
+        own_trials, _DURATION, *draw_sensors(random, loud),
     )  # fmt: skip
 
 

@@ -95,6 +95,16 @@ def _said_by(command: list[str], **options: Any) -> "subprocess.CompletedProcess
         raise LammpsMissingError(f"{command[0]} does not run: {why}; {INSTALL}") from None
 
 
+def _probed(commands: str, launcher: str, program: str, *, ranks: int) -> "subprocess.CompletedProcess[str]":
+    """What LAMMPS says to these commands on so many ranks, in a folder that is then deleted."""
+    with tempfile.TemporaryDirectory(prefix="hedgebed-lammps-") as name:
+        (Path(name) / "probe").write_text(commands, encoding="ascii")
+        return _said_by(
+            [launcher, "-n", str(ranks), program, "-in", "probe", "-log", "none"], cwd=name,
+            env={**os.environ, **_ENVIRONMENT}, timeout=120,
+        )  # fmt: skip
+
+
 @cache
 def check_ranks(ranks: int) -> None:
     """Raise LammpsMissingError where mpiexec does not start LAMMPS on so many ranks that see one another, ValueError
@@ -106,12 +116,7 @@ def check_ranks(ranks: int) -> None:
             f"core, are possible; more ranks than cores make no run faster"
         )
     launcher, program = find_lammps()
-    with tempfile.TemporaryDirectory(prefix="hedgebed-lammps-") as name:
-        (Path(name) / "probe").write_text(_PROBE, encoding="ascii")
-        done = _said_by(
-            [launcher, "-n", str(ranks), program, "-in", "probe", "-log", "none"], cwd=name,
-            env={**os.environ, **_ENVIRONMENT}, timeout=120,
-        )  # fmt: skip
+    done = _probed(_PROBE, launcher, program, ranks=ranks)
     grids = re.findall(r"(\d+) by (\d+) by (\d+) MPI processor grid", done.stdout)
     seen = [int(a) * int(b) * int(c) for a, b, c in grids]
     if seen == [ranks]:
@@ -135,12 +140,7 @@ def cohesion_fault(cohesion: str) -> str | None:
         return None
     launcher, program = find_lammps()
     asked = f"pair_coeff * * {cohesion} 1 0.9 0 0.1 tangential linear_nohistory 0 0 damping tsuji\n"
-    with tempfile.TemporaryDirectory(prefix="hedgebed-lammps-") as name:
-        (Path(name) / "probe").write_text(f"atom_style sphere\n{_PROBE}pair_style granular\n{asked}", encoding="ascii")
-        done = _said_by(
-            [launcher, "-n", "1", program, "-in", "probe", "-log", "none"], cwd=name,
-            env={**os.environ, **_ENVIRONMENT}, timeout=120,
-        )  # fmt: skip
+    done = _probed(f"atom_style sphere\n{_PROBE}pair_style granular\n{asked}", launcher, program, ranks=1)
     refusal = re.search(r"ERROR: (.*?)( \(|$)", done.stdout + done.stderr, re.MULTILINE)
     if refusal is None:
         return None

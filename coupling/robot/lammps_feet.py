@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from coupling.lammps import LammpsGround, OutOfPlaneError, check_count, check_plane
-from dem import Bed
+from dem import Bed, Facing
 from rigid.ground.reaction import Reaction, Turned
 
 from .bed_feet import BedFeet, Surface
@@ -40,7 +40,7 @@ class LammpsFeet(BedFeet, LammpsGround):
             **asdict(bed.runtime),
         )  # fmt: skip
         self._shapes = [
-            (body, self._ruler.add_body(shape, position=(0.0, 0.0, bed.height)))
+            (body, self._ruler.place_body(shape, (0.0, 0.0, bed.height), Facing()))
             for body, foot in zip(self.bodies, self.feet, strict=True)
             for shape in foot.shapes
         ]

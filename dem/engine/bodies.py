@@ -29,8 +29,8 @@ class BedBodies(BedBase):
         Args:
             shape: one or several of dem's Ball, Cylinder, Cone, Capsule, Box, Tube, Polyhedron, Mesh, Plane and Placed,
                 in the body's frame. Their union is the body, and touches a grain once. What lies farther sideways from
-                the body's origin than half the bed's period touches nothing. It is
-                warned of (UserWarning) as the body is put in, before it turns.
+                the body's origin than half the bed's period touches nothing. It is warned of
+                (UserWarning) as the body is put in, before it turns.
             position: of the body's origin [m].
             facing: as ``dem.Facing`` has it: friction, restitution, rolling_friction of a grain on the body, young [Pa]
                 and poisson of the body, surface_energy of the two [J/m2]. What is not given is the grains' own; without
@@ -71,8 +71,8 @@ class BedBodies(BedBase):
                 if far > half and min(-low, high) < half:
                     warnings.warn(
                         f"a {type(part.bare).__name__} of body {body} reaches {far:.4g} m along {name} from the body's "
-                        f"origin. Beyond half the bed's period, {half:.4g} m, no grain touches "
-                        f"it: use a wider bed, or put the origin in the middle of the body",
+                        f"origin. Beyond half the bed's period, {half:.4g} m, no grain touches it: use a wider bed, or "
+                        f"put the origin in the middle of the body",
                         stacklevel=3,
                     )
 

@@ -53,15 +53,8 @@ def _in_file(number: Number) -> tuple[float, float]:
     return number.value - TO_90 * number.std, number.value + TO_90 * number.std
 
 
-def _held(settings: GroundSettings, table: Map, answer: Answer) -> Held | None:
-    """What the answer owes to the cohesion of the soil; None where that does not matter."""
-    load = answer.load if settings.load is None else settings.load
-    return table.held(answer, load=load, gravity=settings.gravity, diameter=settings.tip_diameter)
-
-
-def ground_file(settings: GroundSettings, table: Map, answer: Answer) -> GroundFile:
-    """The spring-damper of the answer."""
-    held = _held(settings, table, answer)
+def ground_file(settings: GroundSettings, table: Map, answer: Answer, held: Held | None = None) -> GroundFile:
+    """The spring-damper of the answer; ``held``: what it owes to the cohesion of the soil, if that is to be noted."""
     notes = (say("of_map", answer=answer), *([] if held is None else [held.words]))
 
     def estimate(number: Number) -> Estimate:
@@ -103,10 +96,11 @@ def _compute(settings: GroundSettings, folder: RunFolder, progress: Progress) ->
         progress.message(say("threads", s=settings))
     progress.stage("look up", total=1.0)
     table, answer, too_deep = _as_deep_as_known(settings)
-    ground_file(settings, table, answer).write(folder.path / GROUND_FILE)
+    load = answer.load if settings.load is None else settings.load
+    held = table.held(answer, load=load, gravity=settings.gravity, diameter=settings.tip_diameter)
+    ground_file(settings, table, answer, held).write(folder.path / GROUND_FILE)
     progress.update(1.0)
     k, c, sinkage = answer.stiffness, answer.damping, answer.sinkage
-    load = answer.load if settings.load is None else settings.load
     of_sinkage = quantity(sinkage.value, "m", say("of_sinkage", answer=answer), std=sinkage.std)
     quantities = {
         "stiffness": quantity(k.value, "N/m", say("of_stiffness"), std=k.std),
@@ -119,7 +113,6 @@ def _compute(settings: GroundSettings, folder: RunFolder, progress: Progress) ->
     }
     words = table.words(answer, gravity=settings.gravity, diameter=settings.tip_diameter)
     unknown = [say("too_deep", load=load, deepest=1e3 * table.deepest * settings.tip_diameter)] if too_deep else []
-    held = _held(settings, table, answer)
     if held is not None:
         low, high = held.sinkage
         quantities |= {

@@ -28,11 +28,20 @@ from experiments.grains.bearing import (
 from experiments.runs.types import Json
 from rigid.platform.rig import STANDARD_GRAVITY
 from vis.penetrate.summary import REAL_GRAINS
+from vis.penetrate.summary_parts import joined
 
 from . import beds
 from .findings import Findings
 from .settings import PenetrateSettings, say
-from .sure import Interval, in_words, interval_of_rest, interval_of_sinkage, interval_of_stiffness, known_within
+from .sure import (
+    Interval,
+    ends_of,
+    in_words,
+    interval_of_rest,
+    interval_of_sinkage,
+    interval_of_stiffness,
+    known_within,
+)
 from .units import Unit
 
 __all__ = ["answer", "how_sure", "made_units", "sinkage_interval"]
@@ -73,7 +82,7 @@ def answer(findings: Findings, material: Any) -> Json | None:
     told: Json = {
         "s": settings, "depth": _length(depths[0]), "foot": 1e3 * settings.foot, "floor": 1e3 * settings.bed_size[2],
         "plate": _length(depths[1]), "formula": _lengths(*formula), "angle": angles[0],
-        "angles": _ends(*angles), "enough": _ends(*reversed(enough), digits=2),
+        "angles": ends_of(angles[0], angles[-1]), "enough": ends_of(enough[-1], enough[0], digits=2),
         "g": settings.gravity / STANDARD_GRAVITY, "driven": 1e3 * settings.depth,
         "of_k": "the fitted K" if findings.fit.stiffness > 0 else "the expected K",
         "body": say("body_first"),
@@ -189,16 +198,8 @@ def how_sure(findings: Findings, material: Any, rest: Json | None) -> Json:
     ends = None if stiffness is None else interval_of_rest(settings.weight, stiffness, rest["depth_range"][1])
     beyond = settings.weight / force if force > 0 else None
     low, high = ends or (None, None)
-    times = (
-        ""
-        if beyond is None
-        else say(
-            "far_beyond",
-            times=_two_digits(beyond),
-            force=f"{force:.2g}",
-            one=", in one of the beds" if len(findings.seeds) > 1 else "",
-        )
-    )
+    one = ", in one of the beds" if len(findings.seeds) > 1 else ""
+    times = "" if beyond is None else say("far_beyond", times=_two_digits(beyond), force=f"{force:.2g}", one=one)
     if low is None:
         known = say("rest_unknown", why=_why_unknown(findings, stiffness, cohesive=material.cohesion != "none"))
     else:
@@ -256,13 +257,6 @@ def _lengths(low: float, high: float) -> str:
     return in_words(low, high, "m") if high > low else _length(low)
 
 
-def _ends(*values: float, digits: int = 3) -> str:
-    """The first and the last of some numbers, or one where they are the same: "28.9 to 34.2"."""
-    texts = [f"{value:.{digits}g}" for value in (values[0], values[-1])]
-    return texts[0] if texts[0] == texts[1] else " to ".join(texts)
-
-
 def _listed(values: Sequence[float], *, digits: int = 3) -> str:
     """Some numbers: "54, 35 or 7.2"."""
-    texts = [f"{value:.{digits}g}" for value in values]
-    return texts[0] if len(texts) == 1 else f"{', '.join(texts[:-1])} or {texts[-1]}"
+    return joined([f"{value:.{digits}g}" for value in values], last="or")

@@ -25,7 +25,7 @@ from .reference import compare_with, read_reference
 from .rest import answer, how_sure, sinkage_interval
 from .settings import PenetrateSettings, say
 from .similarity import fast_for_gravity, pace_of, similarity_of
-from .sure import in_words
+from .sure import ends_of, in_words
 from .units import Unit, make_spike
 
 __all__ = [
@@ -264,10 +264,9 @@ def stiffer_warning(notes: Sequence[Json]) -> list[str]:
         return []
     seeds = sorted({note["seed"] for note in notes})
     young = {note["seed"]: note["young"] for note in notes}.values()  # the last of each seed
-    last = " to ".join(dict.fromkeys(f"{value:.3g}" for value in (min(young), max(young))))
     overlap = max(note["overlap"] for note in notes)
-    return [say("stiffer_seeds", seeds=joined(list(map(str, seeds))), percent=100 * overlap, last=last,
-                which="seed" if len(seeds) == 1 else "seeds")]  # fmt: skip
+    return [say("stiffer_seeds", seeds=joined(list(map(str, seeds))), percent=100 * overlap,
+                last=ends_of(min(young), max(young)), which="seed" if len(seeds) == 1 else "seeds")]  # fmt: skip
 
 
 def overlap_warning(overlap: float | None, settings: PenetrateSettings, softening: Softening) -> str | None:

@@ -180,9 +180,9 @@ def more_or_less(share: float, above: str, below: str) -> str:
     return f"{percent(abs(share))} {above if share > 0 else below}"
 
 
-def joined(words: list[str]) -> str:
-    """ "a, b and c"."""
-    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}" if words else ""
+def joined(words: list[str], last: str = "and") -> str:
+    """ "a, b and c"; ``last``: the word before the last one."""
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} {last} {words[-1]}" if words else ""
 
 
 def sentence(text: str) -> str:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from rigid.result import read_result
-from vis.page.folder import read_folder
+from vis.page.folder import from_python, read_folder
 from vis.page.numbers import with_squares
 from vis.page.page import Block, scene_block, text, write_template
 from vis.page.report import Progress
@@ -118,19 +118,11 @@ def _title(home: Path) -> tuple[str, list[str]]:
     settings = {setting.key: setting.value.strip("\"'") for setting in run.settings}
     title = with_squares(str(result.get("title") or f"Run in {home.resolve().name}"))
     lead = [f"hedgebed {result['version']}"] if "version" in result else []
-    surface = str(result.get("surface") or settings.get("material") or settings.get("surface") or "")
-    named = bool(surface) and not _is_number(surface)  # the run of a script states a height [m]
-    lead += [str(result.get("experiment") or "no result yet"), *([f"surface: {surface}"] if named else [])]
+    of_script = from_python(run)  # there `surface` is a height [m]
+    surface = result.get("surface") or settings.get("material") or (None if of_script else settings.get("surface"))
+    lead += [str(result.get("experiment") or "no result yet"), *([f"surface: {surface}"] if surface else [])]
     lead += [f"folder: {home.resolve().name}", *([f"status: {run.status}"] if run.status != "done" else [])]
     return title, lead
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
 
 
 def _head(scenes: Sequence[Packed], title: str, live: float = 0.0) -> str:

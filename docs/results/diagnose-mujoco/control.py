@@ -31,9 +31,7 @@ def by_base(numbers, duration, **_):
     """The motion of the planar model. Raises ValueError for a number that the second simulator does not have."""
     if unknown := set(numbers) - set(second.COLUMNS):
         raise ValueError(f"the second simulator has no {', '.join(sorted(unknown))}")
-    given = {"length": 0.2, "wheel_inertia": 1.2e-3, "shear_stiffness": 1e6, "shear_damping": 1e3,
-             "gravity_local": numbers["gravity_sim"]} | numbers  # fmt: skip
-    time, motions = second.move(np.array([[float(given.get(name, 0.0)) for name in second.COLUMNS]]), duration)
+    time, motions = tumble.move_base_model([numbers], duration)
     return time, motions[0][:, :7]
 
 

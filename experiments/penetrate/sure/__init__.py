@@ -8,6 +8,7 @@ Imports `coupling`, `experiments.campaign`, `experiments.diagnose.fit`, `experim
 from .interval import (
     Interval,
     Trend,
+    ends_of,
     in_words,
     interval_of_rest,
     interval_of_sinkage,
@@ -17,6 +18,6 @@ from .interval import (
 )
 
 __all__ = [
-    "Interval", "Trend", "in_words", "interval_of_rest", "interval_of_sinkage", "interval_of_stiffness",
+    "Interval", "Trend", "ends_of", "in_words", "interval_of_rest", "interval_of_sinkage", "interval_of_stiffness",
     "known_within", "trends",
 ]  # fmt: skip

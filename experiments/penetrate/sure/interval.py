@@ -26,7 +26,7 @@ from rigid.intervals import half_width, student
 from vis.page.numbers import between, foldable, within
 
 __all__ = [
-    "Interval", "Trend", "in_words", "interval_of_rest", "interval_of_sinkage", "interval_of_stiffness",
+    "Interval", "Trend", "ends_of", "in_words", "interval_of_rest", "interval_of_sinkage", "interval_of_stiffness",
     "known_within", "trends",
 ]  # fmt: skip
 
@@ -142,6 +142,11 @@ def _half(values: Sequence[float], kept: tuple[float, int] | None) -> float | No
 def in_words(low: float, high: float, unit: str) -> str:
     """Two ends with two digits and one unit, for text that folds: "0 to 7.3 mm"."""
     return foldable(between(low, high, unit))
+
+
+def ends_of(low: float, high: float, *, digits: int = 3) -> str:
+    """Two plain numbers, or one where both read the same: "28.9 to 34.2"."""
+    return " to ".join(dict.fromkeys(f"{value:.{digits}g}" for value in (low, high)))
 
 
 def known_within(low: float, high: float, unit: str) -> str:
