@@ -19,7 +19,7 @@ from dem.grains.packing import bulk_packing, surface_height
 from rigid.ground.reaction import State
 
 from .law import WALL_TRIAL, MeanContact, kinetic_energy, law_words, spring_energy, spring_force
-from .process import Lammps
+from .process import Lammps, cohesion_fault
 from .regions import MovingBody, check_count, check_thickness, pieces_of
 from .rolling import RollingClasses
 from .words import box_of, data_file, digits, spheres
@@ -41,7 +41,7 @@ class LammpsBed:
     ``begin``: where LAMMPS' box begins along x [m]. A body does not reach across its ends.
 
     Raises ValueError, naming it, for what has no counterpart: bodies that are already in the bed, a restitution below
-    LAMMPS' dashpot. Raises LammpsMissingError where LAMMPS cannot be started.
+    LAMMPS' dashpot, a cohesion that this LAMMPS refuses. Raises LammpsMissingError where LAMMPS cannot be started.
     """
 
     precision = "float64"
@@ -53,6 +53,9 @@ class LammpsBed:
             raise ValueError(
                 f"the bed has {bodies} bodies: for LAMMPS it needs its floor and no other body; prepare it anew"
             )
+        refusal = cohesion_fault(bed.material.cohesion)
+        if refusal is not None:
+            raise ValueError(f"material {bed.material.name!r}: {refusal}")
         self.material: Material = bed.material
         self.size, self.height, self.gravity = bed.size, bed.height, bed.gravity
         self.time_step, self.grain_count, self.seed = bed.time_step, bed.grain_count, bed.seed

@@ -109,14 +109,11 @@ class CohesiveMap:
         The part of K that cohesion carries is taken in proportion to it. ``load``: Of the sinkage [N]. ``gravity``:
         [m/s2]. ``diameter``: Of the tip [m].
         """
-        stuff = MATERIALS[self.name]
-        found = cohesion_in_95(stuff)
-        if found is None:
+        carried = self._carried(gravity, diameter)
+        if carried is None:
             return None
-        g, size = gravity / self.reference["gravity"], diameter / self.reference["diameter"]
-        share = self.law["share"] * size / ((1 - self.law["share"]) * g * size**2 + self.law["share"] * size)
-        softer = 1 - share + share * found.least / found.value
-        depths = footing_depths(stuff, load / (math.pi * diameter**2 / 4), gravity=gravity, diameter=diameter,
+        found, share, softer = carried
+        depths = footing_depths(MATERIALS[self.name], load / (math.pi * diameter**2 / 4), gravity=gravity, diameter=diameter,
                                 cohesion=found.least)  # fmt: skip
         firm = load / answer.stiffness.value
         ends = (firm / softer, *depths)
@@ -124,6 +121,26 @@ class CohesiveMap:
         if max(known) <= firm * (1 + answer.sinkage.half / answer.sinkage.value):
             return None
         return Held(found, share, load, (min(ends), max(ends)))
+
+    def _carried(self, gravity: float, diameter: float) -> tuple[Cohesion, float, float] | None:
+        """The cohesion of the soil, its share of K [1], and K at the least cohesion over K [1]; None where not known."""
+        found = cohesion_in_95(MATERIALS[self.name])
+        if found is None:
+            return None
+        g, size = gravity / self.reference["gravity"], diameter / self.reference["diameter"]
+        share = self.law["share"] * size / ((1 - self.law["share"]) * g * size**2 + self.law["share"] * size)
+        return found, share, 1 - share + share * found.least / found.value
+
+    def if_cohesion_holds(self, answer: Answer, *, gravity: float, diameter: float) -> list[str]:
+        """That K needs the cohesion of the soil, where the least cohesion leaves less of K than its error says.
+
+        ``gravity``: [m/s2]. ``diameter``: Of the tip [m].
+        """
+        carried, k = self._carried(gravity, diameter), answer.stiffness
+        if carried is None or 1 <= carried[2] * (1 + k.half / k.value):
+            return []
+        cohesion, share, softer = carried
+        return [say("if_it_holds_for_k", percent=100 * share, cohesion=cohesion, part=softer)]
 
     def words(self, answer: Answer, *, gravity: float, diameter: float) -> list[str]:
         """What a person must know of this map besides its numbers."""

@@ -105,7 +105,8 @@ class GravityRule:
             say("of_map", grains=grains, gravity=self.gravity, spike=1e3 * surface.spike, numbers=numbers, real=real)
         ]
         if self.sticky is not None:
-            return [*told, *self.sticky.words(self.answer, gravity=self.gravity, diameter=self.largest)]
+            held = self.sticky.if_cohesion_holds(self.answer, gravity=self.gravity, diameter=self.largest)
+            return [*told, *held, *self.sticky.words(self.answer, gravity=self.gravity, diameter=self.largest)]
         similar = self.answer.stiffness.value * (self.largest / surface.spike) ** POWERS["stiffness"][1]
         if "stiffness" in names and self.of_foot is not None and abs(self.of_foot.value / similar - 1) > SAME:
             told.append(

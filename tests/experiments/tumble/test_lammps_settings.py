@@ -7,8 +7,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from coupling.lammps import LammpsEndedError, LammpsMissingError, check_ranks, cohesion_fault, find_lammps
+from coupling.lammps import LammpsBed, LammpsEndedError, LammpsMissingError, check_ranks, cohesion_fault, find_lammps
 from dem import SAND
+from dem.grains.materials import MATERIALS
 from experiments.cli.main import main
 from experiments.cli.runs import FAILED, carry_out
 from experiments.grains import lammps
@@ -103,6 +104,9 @@ def test_cohesion_that_this_lammps_refuses_is_named_before_the_bed_is_prepared(m
     assert main(["penetrate", *sticky, "--out", str(tmp_path / "run")]) == 2
     said = capsys.readouterr().err.replace("\n", " ")
     assert re.search(r"'jsc-1a-loose-cut'.*'dmt'.*tsuji.*2021.*'bed'", said)
+    bed = SimpleNamespace(state=lambda: {"numbers": (0, 1)}, has_floor=True, material=MATERIALS["jsc-1a-loose-cut"])
+    with pytest.raises(ValueError, match=r"'jsc-1a-loose-cut'.*'dmt'.*tsuji"):
+        LammpsBed(bed, ranks=1)
 
 
 def test_lammps_of_2021_takes_cohesion_and_that_of_2025_is_refused_by_name():
