@@ -6,6 +6,7 @@ Nothing here comes from `rigid` or `coupling`.
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from importlib.metadata import version
 from typing import Any
 
 import numpy as np
@@ -68,7 +69,7 @@ def make_soft(
     made = bench.measure([settings])[0] if chosen else clean
     secret = secret_of(
         plan, () if kind in ("null", *OUTSIDE) else names, chosen, settings, outside=kind if kind in OUTSIDE else None,
-        structure=structure,
+        structure=structure, mujoco=version("mujoco"),
     )  # fmt: skip
     return record(random, plan, made, title="soft"), secret
 

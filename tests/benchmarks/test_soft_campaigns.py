@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from importlib.metadata import version
 
 import numpy as np
 import pytest
@@ -118,6 +119,7 @@ def test_a_seed_makes_one_campaign_and_it_is_valid(tmp_path, monkeypatch):
     case = {"seed": 3, "kind": "loose-mass", "strength": 2.0, "trials": 4}
     (made, told), (again, _) = tumble.make_soft(**case), tumble.make_soft(**case)
     assert (told.effects, told.outside) == ((), "loose-mass")
+    assert told.extra["mujoco"] == version("mujoco")
     assert all(np.array_equal(made.columns[key][name], again.columns[key][name])
                for key in made.columns for name in made.columns[key])  # fmt: skip
     folder = write_campaign(tmp_path / "campaign", campaign_of(made))
