@@ -85,12 +85,15 @@ def _how_often(diagnosis: Row) -> list[str]:
     counted = diagnosis.get("counted")
     if diagnosis["verdict"] != "named" or counted is None:
         return []
-    named, right = counted["named"], counted["right"]
-    of = say(f"of_{counted['of']}")
+    of, soft = say(f"of_{counted['of']}"), counted.get("mujoco")
     if len(diagnosis["effects"]) > 1:
         pairs = counted.get("pairs")
-        return [] if pairs is None else [say("how_often_pairs", of=of, pairs=pairs, least=_least(pairs))]
-    return [say("how_often", of=of, named=named, right=right, least=_least(counted))]
+        too = "" if soft is None else say("of_mujoco", counted=soft["pairs"])
+        more = say("more_names") if len(diagnosis["effects"]) > 2 else ""
+        told = {"of": of, "pairs": pairs, "too": too, "more": more}
+        return [] if pairs is None else [say("how_often_pairs", **told, least=_least(pairs))]
+    too = "" if soft is None else say("of_mujoco", counted=soft)
+    return [say("how_often", of=of, counted=counted, least=_least(counted), too=too)]
 
 
 def _least(counted: Row) -> float:

@@ -25,7 +25,7 @@ from experiments.diagnose.push.problem import make_problem
 from experiments.diagnose.push.remarks import Push, at_one_speed, contradict, highest_damping
 from experiments.diagnose.report.document import COUNTS, _write_model, _write_near_models, document, peak_ratios
 from experiments.diagnose.report.gaps import Gaps
-from experiments.diagnose.report.sentences import behind_words
+from experiments.diagnose.report.sentences import _how_often, behind_words
 from experiments.diagnose.report.summary import summary_sentences
 from experiments.diagnose.report.to_use import near_model_sentences, peak_sentences, use_sentences
 from experiments.diagnose.settings import DiagnoseSettings
@@ -377,10 +377,10 @@ def test_the_push_that_confirms_a_name_is_stated_with_both_predictions(result):
     assert abs(apart["one_N"] - truth) < 4 * error < abs(apart["one_N"] - apart["other_N"])
 
 
-def _counted(kind, seeds):
+def _counted(kind, seeds, suite="diagnose-second"):
     rows = []
     for seed in seeds:
-        path = Path(__file__).parents[4] / "docs" / "results" / "diagnose-second" / f"{kind}-{seed}" / "cases.jsonl"
+        path = Path(__file__).parents[4] / "docs" / "results" / suite / f"{kind}-{seed}" / "cases.jsonl"
         own = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
         assert {row["case"]["seed"] // 1000 for row in own} == {seed} and len(own) == 40
         rows += own
@@ -403,6 +403,18 @@ def test_how_often_two_names_are_right_is_what_the_kept_counts_have(kind, of):
     hidden = [row for row in rows if row["outside"] is None and len(row["truth"]) > 1]
     found = {"named": len(named), "right": len(right), "hidden": len(hidden)}
     assert counted == {"seeds": counted["seeds"]} | found
+
+
+def test_how_often_a_name_is_right_on_mujocos_tumbles_is_what_the_kept_counts_have():
+    counted, pairs = COUNTS["mujoco"]["tumbles"], COUNTS["mujoco"]["pairs"]["tumbles"]
+    rows, named, right = _counted("tumble", counted["seeds"], "diagnose-mujoco")
+    assert counted == {"seeds": pairs["seeds"], "named": len(named), "right": len(right)}
+    both = [row for row in rows if row["outside"] is None and len(row["truth"]) > 1]
+    two = [sum(len(row["effects"]) > 1 for row in found) for found in (named, right)]
+    assert [pairs["named"], pairs["right"], pairs["hidden"]] == [*two, len(both)]
+    said = " ".join(_how_often({"verdict": "named", "effects": ["slope"],
+                                "counted": {"of": "tumbles", **COUNTS["tumbles"], "mujoco": counted}}))  # fmt: skip
+    assert f"; {len(right)} of {len(named)} on tumbles that MuJoCo moved" in said
 
 
 def test_a_k_of_a_power_of_depth_is_said_with_the_depth_it_belongs_to(result):
