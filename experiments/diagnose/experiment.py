@@ -158,7 +158,9 @@ def _result(found: Diagnosis, diagnosis: Json, made_up: str | None) -> Result:
         quantities = base["after"] | effects | quantities | base["before"]
     else:
         quantities |= base["before"] | base["after"] | effects
-    sentences = [*where_sentences(diagnosis), *found.remarks, *found.facts]
+    summary = summary_sentences(diagnosis)
+    remarks = [one for one in found.remarks if not any(one.removesuffix(".") in told for told in summary)]
+    sentences = [*where_sentences(diagnosis), *remarks, *found.facts]
     noises = [together([colour]) for colour in found.colours.values()]
     sentences += [f"{words[0].upper()}{words[1:]}." for words in noises]
     sentences += spread_sentences(found.model_std, granular=found.problem.granular)
@@ -181,6 +183,6 @@ def _result(found: Diagnosis, diagnosis: Json, made_up: str | None) -> Result:
         if ends:
             warnings.append(f"fitted by {model} to the end of its range: {', '.join(ends)}")
     return Result.make(
-        "diagnose", title=title_words(diagnosis), verdict=found.verdict, summary=summary_sentences(diagnosis),
+        "diagnose", title=title_words(diagnosis), verdict=found.verdict, summary=summary,
         quantities=quantities, tables=told_tables(diagnosis), departures={"sentences": sentences}, warnings=warnings,
     )  # fmt: skip

@@ -19,8 +19,8 @@ from .search import Choice
 
 __all__ = [
     "Gap", "bends_to_anything", "certain", "closes", "diverging_beside", "explains_nothing", "gap_of",
-    "held_out_divergences", "is_misfit_of_form", "missed", "one_number", "smallest", "unscattered", "values_of_all",
-    "verdict_of", "well_known",
+    "held_out_divergences", "is_misfit_of_form", "missed", "one_number", "shares_left", "smallest", "unscattered",
+    "values_of_all", "verdict_of", "well_known",
 ]  # fmt: skip
 
 _AS_LIKELY = 1.0  # nats within which a third effect is named as well
@@ -128,13 +128,18 @@ def explains_nothing(choice: Choice, held_out: tuple[str, ...]) -> bool:
 
 def is_misfit_of_form(choice: Choice, held_out: tuple[str, ...]) -> bool:
     """Whether so little is left that it is the form's misfit: nature's form is never quite the library's."""
-    found, base = choice.best.fit, choice.base.fit
-    left, share = [found.chi_square / found.count], [excess(found) / max(excess(base), 1e-9)]
+    found = choice.best.fit
+    left, share = [found.chi_square / found.count], shares_left(choice, held_out)
     if held_out:
         left.append(_left_of(found, held_out))
-        share.append(_share_left(choice, held_out))
     next_to_nothing = all(one < most * _NEXT_TO_NOTHING for one, most in zip(share, (1, 2), strict=False))
     return (max(left) <= _AS_NOISY and share[0] < _RIGHT_FORM) or next_to_nothing
+
+
+def shares_left(choice: Choice, held_out: tuple[str, ...]) -> list[float]:
+    """What the best leaves beyond noise over what the base model leaves [1]: of fitted trials, and of held-out ones."""
+    fitted = excess(choice.best.fit) / max(excess(choice.base.fit), 1e-9)
+    return [fitted, _share_left(choice, held_out)] if held_out else [fitted]
 
 
 def _too_little(choice: Choice, after: float) -> bool:

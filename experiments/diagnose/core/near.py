@@ -12,7 +12,7 @@ from .deciding import smallest, values_of_all
 from .outcome import Diagnosis
 from .rivals import CLOSE, LEAD, folds_of, predict
 
-__all__ = ["Near", "near_models", "nearest_each", "other_forms"]
+__all__ = ["Near", "likelier", "near_models", "nearest_each", "other_forms"]
 
 _MOST_FORMS = 4  # models of the same effects in other forms: the likeliest of these show how far forms differ
 
@@ -64,18 +64,31 @@ def near_models(found: Diagnosis, nearest: Sequence[Near]) -> list[Diagnosis]:
     """Other answers in the place of the best, each as the diagnosis with that fit.
 
     With other effects: of an ambiguous one those that trials cannot distinguish. Of a named one the `nearest` that are
-    less than `LEAD` behind, by evidence and by prediction. With the same effects: other forms (`other_forms`).
+    less than `LEAD` behind, by evidence and by prediction. What has more evidence and is not named (`likelier`). With
+    the same effects: other forms (`other_forms`).
     """
     if found.choice is None:
         return []
     close = [near.hypothesis for near in nearest if max(near.behind, near.behind_left_out or 0.0) < LEAD]
     close += smallest(found.choice) if found.verdict == "ambiguous" else ()
+    close += likelier(found)
     models = []
     for one in (*close, *other_forms(found)):
         again = settled(fit(one.fit.model, one.fit.values))  # in the weights of the best model's last fit
         effects, values = found.ordered(one), values_of_all(again, found.held_out)
         models.append(replace(found, best=again, best_values=values, effects=effects))
     return models
+
+
+def likelier(found: Diagnosis) -> list[Hypothesis]:
+    """The likeliest candidate with other effects than the named ones, where it has more evidence than these: the rule
+    for a further name refuses it, the trials do not."""
+    choice = found.choice
+    if choice is None or found.verdict != "named":
+        return []
+    named = set(choice.best.effects)
+    others = [one for one in choice.table if set(one.effects) != named and one.score > choice.best.score]
+    return sorted(others, key=lambda one: -one.score)[:1]
 
 
 def other_forms(found: Diagnosis) -> list[Hypothesis]:

@@ -35,6 +35,7 @@ from .model_file import Pairs, model_of, range_of
 from .parameters import base_parameters, comes_back, diameters_of, find_scales, named, speeds_of
 from .remarks import SURE, Push, at_one_speed, contradict, facts, highest_dampings, how_to_determine
 from .slots import PLACES, slot_places, slot_table
+from .stops import doubts_of_damping
 from .zeros import find_force_zeros
 
 __all__ = ["PenetrationProblem", "make_problem"]
@@ -430,6 +431,11 @@ class PenetrationProblem(Problem):
             f"{diameter:g}": {name: float(self._number(values, name, diameter)) for name in ("stiffness", "damping")}
             for diameter in self._diameters
         }
+
+    def remarks(self, values: Values, forms: Sequence[Form]) -> list[str]:
+        """See `Problem`: of C, by the stops of the drive."""
+        dampings = {diameter: self._number(values, "damping", diameter) for diameter in self._diameters}
+        return doubts_of_damping(self._pushes(values, forms, list(self.prepared)), dampings)
 
     def facts(self, values: Values, forms: Sequence[Form], trials: Sequence[str], *, is_open: bool) -> list[str]:
         """Sentences on K, its spread, and whether C can be determined, where it was not known; none with drops."""

@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from experiments.campaign.tables import ERRORS_NOTE, OTHERS_NOTE, PEAKS_NOTE, SCATTER_NOTE
+from experiments.diagnose.core.deciding import shares_left
 from experiments.diagnose.core.effect_texts import SYMBOLS, equations_of, with_comments
 from experiments.diagnose.core.near import Near, near_models, nearest_each
 from experiments.diagnose.core.outcome import Diagnosis, Estimated
@@ -67,6 +68,8 @@ def document(found: Diagnosis, near: Sequence[Near] | None = None) -> dict[str, 
         } | {"freedom": weighed.freedom}
     if rule := found.allowed_by:
         diagnosis["allowed_by"] = rule
+        if rule == "form" and found.choice is not None:
+            diagnosis["shares_left"] = shares_left(found.choice, found.held_out)
     if found.verdict == "unknown":
         diagnosis["leading"] = _leading(found)
         diagnosis["left"] = [asdict(p) for p in found.left]

@@ -10,6 +10,7 @@ from scipy.stats import beta
 
 from experiments.diagnose.core.effect_texts import meaning
 from experiments.diagnose.core.rivals import LEAD
+from experiments.diagnose.core.search import further_gains
 from experiments.diagnose.fit.gaps import numeral
 from experiments.diagnose.fit.problem import Finding
 from vis.diagnose.held_out import worsens_held_out
@@ -96,6 +97,12 @@ def _how_often(diagnosis: Row) -> list[str]:
     return [say("how_often", of=of, counted=counted, least=_least(counted), too=too)]
 
 
+def _must_gain(own: Row) -> str:
+    """The rule of the search for one name more than those of a candidate."""
+    asked = further_gains()
+    return say("must_gain", **asked, second=say("second_name", **asked) if len(own["effects"]) == 1 else "")
+
+
 def _least(counted: Row) -> float:
     """The lower bound of a rate [%] of which `right` of `named` were counted."""
     right, named = counted["right"], counted["named"]
@@ -142,7 +149,7 @@ def _needed(near: Row) -> str:
         return f"a first name needs {LEAD:.0f} in one of them"
     sure = max(near["evidence_behind"], near.get("left_out_behind") or 0.0) >= LEAD
     less = "" if sure else ", so it is the less certain one"
-    return f"a further name needs {near['needed']:.0f} by evidence{less}"
+    return f"a further name needs a lead of {near['needed']:.0f} by evidence{less}"
 
 
 def size_sentences(diagnosis: Row) -> list[str]:
@@ -490,7 +497,7 @@ def _note(diagnosis: Row, names: frozenset[str], best: Mapping[frozenset[str], R
         what = "a further name" if names > named else f"{len(names)} names in the place of {together}"
         share = f"{100 * (left - row['left']) / left:.0f} % of what {together} leaves"
         of_base = f", {100 * (left - row['left']) / whole:.2g} % of what the base model leaves" if whole > 0 else ""
-        return f"gains {more:.1f} nats, {share}{of_base}: less than {what} must gain"
+        return f"gains {more:.1f} nats, {share}{of_base}: less than {what} must gain ({_must_gain(own)})"
     other = next((r for r in diagnosis.get("equivalence", [])[1:] if r["effect"] in names - named), None)
     if other is not None and (other.get("left_out_behind") or 0.0) > 0:
         return f"predicts left-out conditions worse, by {other['left_out_behind']:.0f} nats"

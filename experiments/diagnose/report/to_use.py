@@ -11,9 +11,11 @@ from vis.page.numbers import foldable, quote
 
 from .sentences import say
 
-__all__ = ["law_sentences", "near_model_sentences", "number_words", "peak_sentences", "unloading_sentences",
+__all__ = ["SERIES", "law_sentences", "near_model_sentences", "number_words", "peak_sentences", "unloading_sentences",
            "use_sentences"]  # fmt: skip
 
+SERIES = {"count": 77, "middle": 0.3, "most": 3.3}
+"""By how much K of campaigns without an effect was below the ground's [%]: docs/results/diagnose-second, pushes."""
 _NEUTRAL = 2.0  # standard errors within which a number is not distinguished from 0
 _STRONG, _PAIRS = 0.9, 3  # correlation from which on it is reported, and of how many pairs
 _SHOWN = 4  # diameters whose K is in the sentence; of more it is in the table
@@ -39,7 +41,8 @@ def use_sentences(diagnosis: Mapping[str, Any]) -> list[str]:
     of_depth = "" if depth is None else say("of_depth")
     dampings = [entry for name, entry in after.items() if name.startswith("damping")]
     known = len(stiffnesses) == len(dampings) == 1 and dampings[0]["std"] is not None
-    damping = f" and C = {number_words(dampings[0])}" if known else ""
+    doubt = any(remark.startswith("C = ") for remark in diagnosis.get("remarks", ()))
+    damping = f" and C = {number_words(dampings[0])}{say('c_in_doubt') if doubt else ''}" if known else ""
     sentence = say(
         "use", numbers=", ".join(shown), secant=secant, damping=damping, beside=beside, each=each, of_depth=of_depth
     )
@@ -52,7 +55,9 @@ def use_sentences(diagnosis: Mapping[str, Any]) -> list[str]:
 def _in_series(covered: Mapping[str, Any]) -> str:
     """The warning that the frame bends in pushes as well as the ground, which lowers K; empty without pushes."""
     frame = covered.get("frame_stiffness_N_m")
-    return (f" {say('in_series')}" if frame is None else f" {say('at_the_tip', frame=frame)}") if covered else ""
+    if not covered:
+        return ""
+    return f" {say('in_series', **SERIES)}" if frame is None else f" {say('at_the_tip', frame=frame)}"
 
 
 def _bound(name: str, bound: float) -> str:

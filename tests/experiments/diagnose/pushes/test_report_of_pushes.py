@@ -16,7 +16,7 @@ from experiments.campaign.tables import ERRORS_NOTE, OTHERS_NOTE, SCATTER_NOTE
 from experiments.check import find_implausible
 from experiments.check.shifted import shifted_depths
 from experiments.diagnose import experiment
-from experiments.diagnose.core.near import nearest_each, other_forms
+from experiments.diagnose.core.near import likelier, near_models, nearest_each, other_forms
 from experiments.diagnose.core.rivals import folds_of, predict
 from experiments.diagnose.experiment import diagnose_campaign
 from experiments.diagnose.fit.evidence import Hypothesis
@@ -27,7 +27,7 @@ from experiments.diagnose.report.document import COUNTS, _write_model, _write_ne
 from experiments.diagnose.report.gaps import Gaps
 from experiments.diagnose.report.sentences import _how_often, behind_words
 from experiments.diagnose.report.summary import summary_sentences
-from experiments.diagnose.report.to_use import near_model_sentences, peak_sentences, use_sentences
+from experiments.diagnose.report.to_use import SERIES, near_model_sentences, peak_sentences, use_sentences
 from experiments.diagnose.settings import DiagnoseSettings
 from rigid.series import read_series
 
@@ -285,6 +285,17 @@ def test_a_near_rival_has_a_model_of_its_own_and_a_far_one_has_none(diagnosed, t
             assert stiffness == pytest.approx(again.values["stiffness@0.06"], rel=1e-6)
 
 
+@pytest.mark.parametrize("more", [3.0, -3.0])
+def test_a_candidate_with_more_evidence_than_the_named_effect_has_a_model_though_it_is_not_named(diagnosed, more):
+    *_, found = diagnosed
+    rival, best = found.choice.rivals[0].hypothesis, found.choice.best
+    others = tuple(Hypothesis(rival.fit, best.score + more - less) for less in (0.5, 0.0))
+    one = replace(found, choice=replace(found.choice, rivals=(), table=(best, *others)))
+    assert likelier(one) == ([others[1]] if more > 0 else [])
+    assert [set(model.effects) for model in near_models(one, ())] == ([set(rival.effects)] if more > 0 else [])
+    assert likelier(replace(one, verdict="ambiguous")) == []
+
+
 def test_the_same_effect_in_another_form_has_a_model_where_evidence_does_not_exclude_it(diagnosed, tmp_path):
     """F = K z (z / D)^0.3 is a power. The same power fitted as the quadratic is, 9 or 11 nats behind."""
     *_, found = diagnosed
@@ -393,6 +404,17 @@ def _counted(kind, seeds, suite="diagnose-second"):
 def test_how_often_a_name_is_right_is_what_the_kept_counts_have(kind, of):
     _, named, right = _counted(kind, COUNTS[of]["seeds"])
     assert COUNTS[of] == {"seeds": COUNTS[of]["seeds"], "named": len(named), "right": len(right)}
+
+
+def test_by_how_much_frame_and_first_grains_lower_k_is_what_the_kept_counts_have():
+    low, kept = [], Path(__file__).parents[4] / "docs" / "results" / "diagnose-second"
+    for path in kept.glob("*push-*/cases.jsonl"):
+        for row in map(json.loads, path.read_text(encoding="utf-8").splitlines()):
+            true, found = row.get("hidden", {}).get("base", {}), row.get("base_parameters") or {}
+            if row["verdict"] == "none" and not row["truth"] and {"stiffness"} <= true.keys() & found.keys():
+                low.append(100 * (1 - found["stiffness"]["value"] / true["stiffness"]))
+    assert len(low) == SERIES["count"]
+    assert [round(float(np.median(low)), 1), round(max(low), 1)] == [SERIES["middle"], SERIES["most"]]
 
 
 @pytest.mark.parametrize(("kind", "of"), [("push", "pushes"), ("rig", "rig"), ("tumble", "tumbles")])
