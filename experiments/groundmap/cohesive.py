@@ -113,8 +113,10 @@ class CohesiveMap:
         if carried is None:
             return None
         found, share, softer = carried
-        depths = footing_depths(MATERIALS[self.name], load / (math.pi * diameter**2 / 4), gravity=gravity, diameter=diameter,
-                                cohesion=found.least)  # fmt: skip
+        pressure = load / (math.pi * diameter**2 / 4)
+        depths = footing_depths(
+            MATERIALS[self.name], pressure, gravity=gravity, diameter=diameter, cohesion=found.least
+        )
         firm = load / answer.stiffness.value
         ends = (firm / softer, *depths)
         known = ends if firm <= self.deepest * diameter else ends[:1]  # beyond the map there is no sinkage to compare
@@ -123,7 +125,7 @@ class CohesiveMap:
         return Held(found, share, load, (min(ends), max(ends)))
 
     def _carried(self, gravity: float, diameter: float) -> tuple[Cohesion, float, float] | None:
-        """The cohesion of the soil, its share of K [1], and K at the least cohesion over K [1]; None where not known."""
+        """The cohesion of the soil, its share of K [1], and K at the least cohesion over K [1]; None if not known."""
         found = cohesion_in_95(MATERIALS[self.name])
         if found is None:
             return None
@@ -137,7 +139,7 @@ class CohesiveMap:
         ``gravity``: [m/s2]. ``diameter``: Of the tip [m].
         """
         carried, k = self._carried(gravity, diameter), answer.stiffness
-        if carried is None or 1 <= carried[2] * (1 + k.half / k.value):
+        if carried is None or carried[2] * (1 + k.half / k.value) >= 1:
             return []
         cohesion, share, softer = carried
         return [say("if_it_holds_for_k", percent=100 * share, cohesion=cohesion, part=softer)]

@@ -13,7 +13,6 @@ import numpy as np
 from experiments.diagnose.fit.gaps import numeral
 from experiments.diagnose.fit.problem import Array
 from rigid.intervals import student
-from vis.page.numbers import quote
 
 from .remarks import Push
 
@@ -66,7 +65,8 @@ def _doubt(pushes: Sequence[Push], damping: float) -> list[str]:
     sure = max(_SURE, student(found.count - 1, 2 * 0.997 - 1))
     if apart <= sure * found.std or apart <= _FAR * larger:
         return []
-    quoted = quote(found.damping, found.std * student(found.count - 1, 0.95), "N s/m")
+    half = found.std * student(found.count - 1, 0.95)
+    quoted = f"{numeral(found.damping, 3)} ± {numeral(half, 2)} N s/m"
     return [
         f"C = {numeral(damping, 2)} N s/m. Where the drive stops, the force falls as by C = {quoted} (95 %; "
         f"{numeral(found.low, 2)} to {numeral(found.high, 2)} at {found.count} stops). So the force depends on speed "

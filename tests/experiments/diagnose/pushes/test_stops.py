@@ -33,7 +33,7 @@ def test_the_c_of_the_stops_is_that_of_the_ground_whatever_spring_was_fitted(spr
 def test_a_model_with_another_c_is_doubted_and_one_with_that_c_is_not():
     made = pushes(12.0)
     (said,) = doubts_of_damping(made, {DIAMETER: 4.0})
-    assert said.startswith("C = 4 N s/m.") and "at 6 stops" in said
+    assert "4 N s" in said and "6 stops" in said
     assert doubts_of_damping(made, {DIAMETER: 11.5}) == []
     assert doubts_of_damping(made, {0.06: 4.0}) == []
 
