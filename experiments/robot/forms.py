@@ -147,7 +147,9 @@ def expected_words(numbers: Json, best: Answer, *, on_grains: bool) -> list[str]
     near = next((law for law in (_named(DEFAULT, (DROPPED_INERTIA,)), DEFAULT) if law in answers), None)
     said = [say("forms_with_grains" if on_grains else "forms_of_laws", **words), *_left_out(numbers)]
     if near is not None:
-        said.append(say("expected_of_grains" if on_grains else "expected_of_laws", law=near))
+        softer = on_grains and best["sinkage_largest"] > answers[near]["sinkage_largest"]
+        of_grains = "softer_grains" if softer else "expected_of_grains"
+        said.append(say(of_grains if on_grains else "expected_of_laws", law=near))
     bed_depth = numbers.get("bed_depth", math.inf)
     deeper = [law for law, answer in answers.items() if answer["sinkage_largest"] > bed_depth]
     said += [say("deeper_than_bed", laws="; ".join(deeper), depth=1e3 * bed_depth)] if deeper else []

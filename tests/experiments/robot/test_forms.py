@@ -75,6 +75,8 @@ def test_real_sand_is_expected_between_a_law_and_grains_and_the_range_holds_both
     assert f"{word} is 0.01" in forms.words[0] and "inertia=2 0.01 m;" in forms.words[0]
     assert [re.findall("[0-9]+ m", one.words[1]) for one in (laws, forms)] == [[], []]  # one range only
     assert "Real sand" in laws.words[1] and "'bed'" in laws.words[1] and "inertia=2" in forms.words[1]
+    harder = with_grains(laws, own | {"sinkage_largest": 0.001})  # of the law that is compared: 0.01 m and more
+    assert ["likelier" in one.words[1] for one in (forms, harder)] == [False, True]
     assert with_grains(NO_FORMS, own) == NO_FORMS
     landings = [any("--duration" in words and "0.12 s" in words for words in one.words) for one in (laws, forms)]
     assert landings == [True, True] and laws.numbers["duration"] == forms.numbers["duration"] == 0.12
