@@ -104,8 +104,9 @@ class FootForces(AbstractContextManager["FootForces"]):
         self._remembers = found.has_memory
         self._make_ground = partial(LawFeet, self.feet, law=law, parameters=given, scales=scales, under=under)
         memory = _springback_of(found, [under.get(p.name, given) for f in feet for p in f.parts])
+        self._force = np.zeros(3)
         names = {
-            "model": model, "apply": mujoco.mj_applyFT, "force": np.zeros(3), "torque": np.zeros(3),
+            "model": model, "apply": mujoco.mj_applyFT, "force": self._force, "torque": np.zeros(3),
             "warn": self._warn, "warn_fast": self._warn_fast,
         }  # fmt: skip
         self._depths: WeakKeyDictionary[Any, _Depths] = WeakKeyDictionary()
@@ -184,6 +185,20 @@ class FootForces(AbstractContextManager["FootForces"]):
         before, now, total = depths.before, depths.now, self._total
         for push, place, turn, moving, middle in self._views:
             self.points += push(data, place, turn, moving, middle, total, before, now)
+
+    def forces(self, data: Any) -> dict[str, np.ndarray]:
+        """Force of the ground on each foot [N], world axes, shape (3,), by the name of the foot; 0 in the air.
+
+        It is that of the last call, where bodies were then (as MuJoCo's sensors after ``mj_step``). Changes nothing.
+        """
+        if data is not self._seen:
+            self._look_at(data)
+        found, unused = {}, np.zeros_like(self._total)
+        for foot, (push, *rows) in zip(self.feet, self._views, strict=True):
+            self._force[:] = 0.0
+            push(data, *rows, unused, self._own.before, list(self._own.now))
+            found[foot.name] = self._force.copy()
+        return found
 
     def _warn(self, depth: float, name: str, limit: float) -> None:
         """Warn that a part goes deeper than its parameters hold [m], once."""

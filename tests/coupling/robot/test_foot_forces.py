@@ -30,7 +30,8 @@ def stepped(model, names, duration, *, step=2e-4, before=None, **options):
 
 
 def test_a_ball_comes_to_rest_where_the_spring_carries_it_as_in_a_run():
-    data, forces = stepped(ball(height=0.06), ["foot"], 1.2, parameters=SOFT)
+    data, forces = stepped(model := ball(height=0.06), ["foot"], 1.2, parameters=SOFT)
+    mass = float(model.body_mass.sum())
     assert data.qpos[2] == pytest.approx(0.05 - 9.81 / 2000.0, rel=1e-3)
     robot = MujocoRobot(ball(height=0.06), "foot")
     run = RobotRun(robot, LawFeet(robot.feet, parameters=SOFT, time_step=2e-5), duration=0.1)
@@ -38,6 +39,7 @@ def test_a_ball_comes_to_rest_where_the_spring_carries_it_as_in_a_run():
     early, _ = stepped(ball(height=0.06), ["foot"], 0.1, parameters=SOFT)
     assert early.qpos[2] == pytest.approx(robot.data.qpos[2], abs=5e-5)
     assert forces.points > 1000
+    assert forces.forces(data)["foot"] == pytest.approx([0.0, 0.0, 9.81 * mass], rel=1e-3, abs=1e-9)
 
 
 def test_a_sliding_ball_comes_to_roll_at_five_sevenths_of_its_speed():
@@ -147,6 +149,8 @@ def test_sand_pushes_less_below_the_deepest_depth_and_a_reset_makes_it_new():
     assert again == 0.0
     mujoco.mj_resetData(model, data)
     assert pushed(forces, model, data, 1e-3) == fresh
+    assert [forces.forces(data)["foot"][2] for _ in range(2)] == [fresh, fresh]
+    assert pushed(forces, model, data, 1e-3) == fresh  # reading has changed nothing
     data.time = 5.0  # a state from elsewhere
     assert pushed(forces, model, data, 0.01) > fresh
     data.time = 9.0
