@@ -90,7 +90,8 @@ def sides_warning(bed: Bed) -> str | None:
     if not side.any():
         return None
     way = float(np.median(np.linalg.norm(grains.displacement[side], axis=1))) / diameter
-    return say("sides_moved", way=way) if way > SIDES_MOVED else None
+    wider = " by ".join(f"{1.5 * side:.3g}" for side in bed.size[:2])
+    return say("sides_moved", way=way, wider=wider) if way > SIDES_MOVED else None
 
 
 def overlap_warning(bed: Bed, softening: Softening, max_overlap: float) -> str | None:
