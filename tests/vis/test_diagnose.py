@@ -9,7 +9,7 @@ import pytest
 from matplotlib.colors import to_rgb
 from matplotlib.text import Annotation
 
-from vis.diagnose.campaign import _draw_coverage
+from vis.diagnose.campaign import _draw_coverage, _has_holes, _widths
 from vis.diagnose.evidence import closed_share, draw_evidence
 from vis.diagnose.figures import (
     _PHASES,
@@ -257,3 +257,23 @@ def test_a_bar_that_is_longer_than_that_of_the_named_set_says_why_it_is_not_name
     notes = [text for text in drawing.axes[0].texts if isinstance(text, Annotation)]
     said = {text.xy[1]: text.get_text() for text in notes if text.get_text().startswith("gains too little")}
     assert list(said) == [2]
+
+
+@pytest.mark.parametrize(
+    ("change", "holes"),
+    [({}, False), ({"gaps": [(1.0, 2.0)]}, True), ({"from_s": 0.5}, True), ({"to_s": 3.99}, False)],
+)
+def test_the_chart_of_recorded_times_is_drawn_only_where_something_is_missing(change, holes):
+    pose = {"trial": "a", "sensor": "pose", "from_s": 0.0, "to_s": 4.0, "gaps": []}
+    result = {"recordings": [pose, pose | {"sensor": "imu"} | change], "findings": []}
+    assert _has_holes(result) is holes
+    found = {"trial": "a", "channel": "x", "what": "one reading", "from_s": 1.0, "to_s": 1.0}
+    assert _has_holes(result | {"findings": [found]})
+
+
+def test_a_deeper_push_has_a_thicker_line_that_shallower_ones_do_not_hide():
+    files = {name: {"depth_m": np.array([0.0, depth, np.nan])} for name, depth in zip("abc", (1, 3, 3), strict=True)}
+    trials = [{"id": name, "condition": depth} for name, depth in zip("abc", ("1", "3", "3"), strict=True)]
+    widths = _widths(files, trials)
+    assert widths["a"] < widths["b"] == widths["c"]
+    assert _widths(files, trials[:1]) == {"a": widths["a"]}

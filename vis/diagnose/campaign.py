@@ -28,7 +28,7 @@ _MOST_LINES = 60
 _SLIVER = 0.01  # share of a recording below which a finding has a mark above it
 _UNCOVERED = 0.02
 """Share of a trial's time from which on a sensor that begins later or ends earlier than the others is shown."""
-_THICKEST, _THINNEST = 3.0, 0.9
+_THICKEST, _THINNEST = 2.2, 0.9
 """Lines of the first condition drawn and of the last: runs under others are seen on both sides of these."""
 #: (sensor, column, factor, label, channel of findings)
 _TUMBLE = (
@@ -113,10 +113,7 @@ def write_inspection_report(report: Report) -> Path:
         Section("Findings", [listing(found) if found else text("Nothing odd was found in the recordings."), *said]),
         Section("", [table(trials["head"], rows, title="Trials", words=True)]),
         Section("The recordings", [*drawn, table(head, [_row(entry) for entry in result["recordings"]])]),
-        again(
-            "hedgebed campaign check THIS_FOLDER/run.toml",
-            "From where it was started (the campaign's path is as given):",
-        ),
+        again("hedgebed campaign check THIS_FOLDER/run.toml", "From where it was started:"),
     ]
     return report.write(
         sections, lead=["campaign check", str(result["kind"])], tiles=inspection_tiles(result), warnings=()
@@ -239,9 +236,8 @@ def _widths(files: Mapping[str, Mapping[str, Array]], trials: Sequence[Result]) 
         deepest = float(np.nanmax(files[trial["id"]]["depth_m"], initial=-math.inf))
         depths[trial["condition"]] = max(depths.get(trial["condition"], -math.inf), deepest)
     order = sorted(depths, key=lambda condition: -depths[condition])
-    step = (_THICKEST - _THINNEST) / max(1, len(order) - 1) if len(order) > 1 else 0.0
-    least = _THINNEST + step * (len(order) - 1)
-    width = {condition: least - step * place for place, condition in enumerate(order)}
+    widths = np.linspace(_THICKEST, _THINNEST, len(order)) if len(order) > 1 else [_THINNEST]
+    width = dict(zip(order, map(float, widths), strict=True))
     return {trial["id"]: width[trial["condition"]] for trial in trials}
 
 

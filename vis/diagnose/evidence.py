@@ -109,8 +109,8 @@ def _draw_left(axis: Axes, rows: Sequence[Result], colours: Sequence[str], diagn
         axis.plot(value, place, "o", color=colour, ms=5.5, zorder=3)
         closes = row.get("closes")
         if closes is not None:
-            axis.annotate(closed_share(closes), (1.01, place), xycoords=("axes fraction", "data"), va="center", fontsize=7.5,
-                          color=INK, annotation_clip=False)  # fmt: skip
+            axis.annotate(closed_share(closes), (1.01, place), xycoords=("axes fraction", "data"), va="center",
+                          fontsize=7.5, color=INK, annotation_clip=False)  # fmt: skip
     if most < NARROW:
         low = min(1.0, *left)
         axis.set_xlim(low - 0.1 * max(most - low, 0.1), most + 0.1 * max(most - low, 0.1))
