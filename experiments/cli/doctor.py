@@ -89,7 +89,12 @@ def _taichi(arch: str, answer: Answer) -> Finding:
 def _processor() -> Finding:
     known, taken = not unknown_processor(), chosen()
     detail = f"{'known' if known else 'not known'} to Taichi's compiler; computed by {taken}"
-    return Finding("processor", known or taken == "quadrants", detail, "not needed: beds run without it. pip install quadrants makes them faster here")
+    return Finding(
+        "processor",
+        known or taken == "quadrants",
+        detail,
+        "not needed: beds run without it. pip install quadrants makes them faster here",
+    )
 
 
 def _memory() -> Finding:
@@ -122,7 +127,9 @@ def _opengl(answer: Answer) -> Finding:
 
 def _peer(name: str, commands: Sequence[str], package: str) -> Finding:
     found = next((path for path in map(shutil.which, commands) if path), None)
-    return Finding(name, found is not None, found or "not found", f"not needed, except for `hedgebed bench`: apt install {package}")
+    return Finding(
+        name, found is not None, found or "not found", f"not needed, except for `hedgebed bench`: apt install {package}"
+    )
 
 
 def _lammps() -> Finding:
