@@ -78,8 +78,8 @@ def _python() -> Finding:
 def _taichi(arch: str, answer: Answer) -> Finding:
     remedies = {
         "cpu": "pip install taichi",
-        "cuda": "needs an NVIDIA card and its driver; the bed runs on the CPU without",
-        "vulkan": "not needed",
+        "cuda": "not needed: the bed runs on the CPU. It needs an NVIDIA card and its driver",
+        "vulkan": "not needed: no command needs it",
     }
     version = answer.get("version", "Taichi")
     detail = f"{version} runs a kernel" if answer["ok"] else f"does not run here ({answer['reason']})"
@@ -89,7 +89,12 @@ def _taichi(arch: str, answer: Answer) -> Finding:
 def _processor() -> Finding:
     known, taken = not unknown_processor(), chosen()
     detail = f"{'known' if known else 'not known'} to Taichi's compiler; computed by {taken}"
-    return Finding("processor", known or taken == "quadrants", detail, "pip install quadrants, which is faster here")
+    return Finding(
+        "processor",
+        known or taken == "quadrants",
+        detail,
+        "not needed: beds run without it. pip install quadrants makes them faster here",
+    )
 
 
 def _memory() -> Finding:
@@ -116,13 +121,15 @@ def _cache() -> Finding:
 def _opengl(answer: Answer) -> Finding:
     drawn = f"a picture off screen ({answer.get('renderer') or 'renderer unknown'})"
     detail = drawn if answer["ok"] else answer["reason"]
-    remedy = "only pictures need it: apt install libegl1 libgl1-mesa-dri, or try again when the machine is less busy"
+    remedy = "not needed for results, only for pictures: apt install libegl1 libgl1-mesa-dri, or try again when the machine is less busy"
     return Finding("OpenGL", answer["ok"], detail, remedy)
 
 
 def _peer(name: str, commands: Sequence[str], package: str) -> Finding:
     found = next((path for path in map(shutil.which, commands) if path), None)
-    return Finding(name, found is not None, found or "not found", f"apt install {package} (only for bench)")
+    return Finding(
+        name, found is not None, found or "not found", f"not needed, except for `hedgebed bench`: apt install {package}"
+    )
 
 
 def _lammps() -> Finding:
@@ -132,16 +139,16 @@ def _lammps() -> Finding:
     try:
         launcher, program = find_lammps()
     except LammpsMissingError as error:
-        return Finding("LAMMPS", False, str(error), "only for --ground lammps and bench")
+        return Finding("LAMMPS", False, str(error), "not needed, except for --ground lammps and `hedgebed bench`")
     return Finding("LAMMPS", True, f"{program}, started by {launcher}")
 
 
-def _extra(name: str, package: str) -> Finding:
-    """A package of the extra `name`."""
+def _extra(name: str, package: str, use: str) -> Finding:
+    """A package of the extra `name`, which only `use` needs."""
     try:
         return Finding(package, True, version(package))
     except PackageNotFoundError:
-        return Finding(package, False, "not found", f"pip install '.[{name}]'")
+        return Finding(package, False, "not found", f"not needed, except for {use}: pip install '.[{name}]'")
 
 
 def examine() -> list[Finding]:
@@ -161,8 +168,8 @@ def examine() -> list[Finding]:
             _opengl(opengl.result()),
             _peer("LIGGGHTS", ["liggghts"], "liggghts"),
             _lammps(),
-            _extra("mujoco", "mujoco"),
-            _extra("sweep", "distributed"),
+            _extra("mujoco", "mujoco", "`hedgebed mujoco`"),
+            _extra("sweep", "distributed", "sweeps on a cluster"),
             _peer("YADE", ["yade"], "yade"),
             _peer("MPI", ["mpirun"], "openmpi-bin"),
             _peer("C compiler", ["cc"], "gcc"),

@@ -135,13 +135,16 @@ def _facts(recording: Recording) -> Json:
 
 
 def _words(campaign: Campaign, conditions: Mapping[str, tuple[object, ...]]) -> dict[str, str]:
-    """The condition of each trial in words; with the depth, or the duration, where the rest is the same for several."""
+    """The condition of each trial in words; with the depth, or the duration, where the rest does not separate them."""
     words = {trial.id: condition_words(campaign.tables, trial) for trial in campaign.tables.trial}
-    groups: dict[str, dict[tuple[object, ...], list[str]]] = {}
+    groups: dict[tuple[object, ...], list[str]] = {}
     for id, condition in conditions.items():
-        groups.setdefault(words[id], {}).setdefault(condition, []).append(id)
-    for several in groups.values():
-        for ids in several.values() if len(several) > 1 else ():
+        groups.setdefault(condition, []).append(id)
+    shared = Counter(words[ids[0]] for ids in groups.values())
+    modes = {id: words[id].split()[0] for id in words}  # driven, drop; motor, brake
+    sized = {modes[ids[0]] for ids in groups.values() if shared[words[ids[0]]] > 1}
+    for ids in groups.values():
+        if modes[ids[0]] in sized:
             size = _size_words([campaign.recordings[key] for key in campaign.recordings if key[0] in ids])
             words |= {id: f"{words[id]}, {size}" for id in ids}
     return words
@@ -151,7 +154,8 @@ def _size_words(recordings: Sequence[Recording]) -> str:
     """How deep the recorded trials of one condition go, or how long they last; the median."""
     depths = [1e3 * float(np.nanmax(r["depth_m"])) for r in recordings if "depth_m" in r.columns]
     if depths:
-        return f"{np.median(depths):.2g} mm deep"
+        depth = float(np.median(depths))
+        return f"{depth:.2g} mm deep" if depth < 99.5 else f"{depth:.0f} mm deep"
     return f"{np.median([float(np.ptp(recording.time)) for recording in recordings]):.3g} s long"
 
 

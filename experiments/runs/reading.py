@@ -4,6 +4,7 @@ A layer is what one source gives: name -> value. Later layers win: the defaults 
 the command line. Every fault is a ValueError whose text names the key, the value and the remedy.
 """
 
+import re
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -23,6 +24,8 @@ __all__ = ["Layer", "find_case", "gravities_told", "option", "read_case", "setti
 
 Settings = TypeVar("Settings", bound=BaseModel)
 
+_VALUE = re.compile(r"[-+]?[0-9]*\.?[0-9]+([eE][-+]?[0-9]+)?[A-Za-z/0-9]*")
+"""A number, maybe with a unit: no name of a case file."""
 _NEAR = 4  # Most names that a message suggests for one that does not exist
 
 
@@ -57,6 +60,10 @@ def find_case(given: Path, shipped: Path, commands: Iterable[str] = ()) -> Path:
                 return named
     if meant := get_close_matches(str(given), list(commands), n=1):
         raise ValueError(f"{str(given)!r} is neither a command nor a file; did you mean {meant[0]!r}?")
+    if _VALUE.fullmatch(str(given)):
+        raise ValueError(
+            f"{str(given)!r} is a number where a case file may stand: an option takes one value, unless its help shows more"
+        )
     own = given if given.suffix else given.with_suffix(".toml")
     if own.parent.is_dir() and (meant_file := alike(own)):
         raise ValueError(f"case = {str(given)!r}: there is no such file{meant_file}")

@@ -6,9 +6,21 @@ import json
 
 import numpy as np
 import pytest
+from matplotlib.colors import to_rgb
+from matplotlib.text import Annotation
 
-from vis.diagnose.campaign import _draw_coverage
-from vis.diagnose.figures import Channel, draw_trajectories, read_channel, source_of, worst
+from vis.diagnose.campaign import _draw_coverage, _has_holes, _widths
+from vis.diagnose.evidence import closed_share, draw_evidence
+from vis.diagnose.figures import (
+    _PHASES,
+    _REPLICATES,
+    _SENSOR,
+    Channel,
+    draw_trajectories,
+    read_channel,
+    source_of,
+    worst,
+)
 from vis.diagnose.report import write_diagnosis_report
 from vis.page.plots import line_handles, line_styles
 
@@ -86,8 +98,8 @@ def test_what_replicates_differ_by_stands_beside_the_gap_and_behind_what_is_left
         ('[notes]\n"made_by" = "hedgebed 0.1.0 tumble on a bed of sand"\n', "simulated on grains"),
         ('[notes]\n"made_by" = "hedgebed 0.1.0 tumble on the spring-damper of sand"\n', "simulated"),
         ('[notes]\n"made_by" = "hedgebed 0.1.0 campaign"\n', "simulated"),
-        ('[notes]\n"made_by" = "the rig in hall 3, on a bed of sand"\n', "as given"),
-        ('format = "hedgehog-model/1"\n', "as given"),
+        ('[notes]\n"made_by" = "the rig in hall 3, on a bed of sand"\n', "trials"),
+        ('format = "hedgehog-model/1"\n', "trials"),
         ('[notes]\nrecorded_by = "CMU"\n', "as recorded (CMU)"),
         ('[notes]\nrecorded_by = "CMU"\nmade_by = "hedgebed 0.1.0 campaign"\n', "simulated"),
         (None, "recorded"),
@@ -192,3 +204,76 @@ def test_replicates_share_a_line_and_conditions_do_not():
     styles = line_styles(keys)
     assert len(styles) == 12 and len({(style["color"], str(style["ls"])) for style in styles.values()}) == 12
     assert [line.get_label() for line in line_handles(["1", "2", "3"], ["a", "b", "a"])] == ["a: 1, 3", "b: 2"]
+
+
+def test_a_spike_of_the_base_model_that_comes_from_outside_its_panel_is_not_drawn():
+    """At rest the base model is 300 standard deviations off; one reading there lies in the panel."""
+    one, time = np.ones(60), np.linspace(0.0, 1.0, 60)
+    base = np.where(time < 0.5, 5.0 * time, 300.0)
+    base[45] = 1.0
+    channel = Channel("a", "force", time, 0 * one, -base, -np.sin(9 * time), one, one, np.array(["in"] * 60))
+    _, right = draw_trajectories([channel], set(), ("base", "best"), "trials").axes
+    drawn = np.asarray(right.lines[0].get_ydata())
+    low, high = right.get_ylim()
+    assert np.isnan(drawn[45]) and np.nanmin(drawn) >= low and np.nanmax(drawn) <= high
+    assert np.isfinite(drawn[:20]).all()
+
+
+def test_a_step_of_the_force_while_the_drive_stops_has_dots():
+    """A recording of 900 readings, of which 10 are the step: at least three of these are drawn."""
+    time = np.arange(900.0)
+    force = np.interp(time, [450.0, 460.0], [40.0, 30.0])
+    one = np.ones(900)
+    channel = Channel("a", "force", time, force, force, force, one, one, np.array(["in"] * 900), None, one)
+    (dots,) = [line for line in draw_trajectories([channel], set(), ("base", "best"), "trials").axes[0].lines
+               if line.get_marker() == "."]  # fmt: skip
+    shown = np.asarray(dots.get_ydata())
+    assert np.sum((shown < 40.0) & (shown > 30.0)) >= 3
+
+
+def test_the_bands_of_the_noise_look_like_no_phase_and_unlike_one_another():
+    """Differences of red, green and blue: the band of replicates had the tan of "free"."""
+    for band in (_REPLICATES, _SENSOR):
+        free = np.subtract(to_rgb(band), to_rgb(_PHASES["free"]))
+        assert np.linalg.norm(free) > 0.7
+    assert np.linalg.norm(np.subtract(to_rgb(_REPLICATES), to_rgb(_SENSOR))) > 0.25
+
+
+def test_shares_near_all_have_the_digits_that_separate_them_from_all():
+    shares = (0.0, 0.588, 0.9375, 0.99, 0.9951, 0.99991450, 0.99999999, 1.0)
+    assert [closed_share(share) for share in shares] == [
+        "0 %", "59 %", "94 %", "99 %", "99.5 %", "99.99 %", ">99.999 %", "100 %"
+    ]  # fmt: skip
+
+
+def test_a_bar_that_is_longer_than_that_of_the_named_set_says_why_it_is_not_named():
+    def row(*effects, score, note=""):
+        return {"effects": effects, "score": score, "left": 1.0, "closes": 0.9, "note": note}
+
+    rows = [row("layering", "adhesion", score=30.0, note="gains 2.0 nats: less than a further name must gain"),
+            row("layering", score=28.0, note="named"), row("adhesion", score=3.0)]  # fmt: skip
+    drawing = draw_evidence({"verdict": "named", "effects": [{"id": "layering"}], "alternatives": [],
+                             "candidates": rows})  # fmt: skip
+    notes = [text for text in drawing.axes[0].texts if isinstance(text, Annotation)]
+    said = {text.xy[1]: text.get_text() for text in notes if text.get_text().startswith("gains too little")}
+    assert list(said) == [2]
+
+
+@pytest.mark.parametrize(
+    ("change", "holes"),
+    [({}, False), ({"gaps": [(1.0, 2.0)]}, True), ({"from_s": 0.5}, True), ({"to_s": 3.99}, False)],
+)
+def test_the_chart_of_recorded_times_is_drawn_only_where_something_is_missing(change, holes):
+    pose = {"trial": "a", "sensor": "pose", "from_s": 0.0, "to_s": 4.0, "gaps": []}
+    result = {"recordings": [pose, pose | {"sensor": "imu"} | change], "findings": []}
+    assert _has_holes(result) is holes
+    found = {"trial": "a", "channel": "x", "what": "one reading", "from_s": 1.0, "to_s": 1.0}
+    assert _has_holes(result | {"findings": [found]})
+
+
+def test_a_deeper_push_has_a_thicker_line_that_shallower_ones_do_not_hide():
+    files = {name: {"depth_m": np.array([0.0, depth, np.nan])} for name, depth in zip("abc", (1, 3, 3), strict=True)}
+    trials = [{"id": name, "condition": depth} for name, depth in zip("abc", ("1", "3", "3"), strict=True)]
+    widths = _widths(files, trials)
+    assert widths["a"] < widths["b"] == widths["c"]
+    assert _widths(files, trials[:1]) == {"a": widths["a"]}

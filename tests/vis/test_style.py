@@ -11,7 +11,8 @@ from matplotlib.text import Text
 from PIL import Image, ImageColor
 
 from vis.compare.report import _draw_path
-from vis.diagnose.figures import _KINDS, _PHASES, BASE
+from vis.diagnose.evidence import _KINDS
+from vis.diagnose.figures import _PHASES, BASE
 from vis.page.folder import read_folder
 from vis.page.plots import AMENDED, BED, MODEL, STATES, as_it_lies, handle, legend_above, new_figure, title_above
 from vis.penetrate.lawfit import _over_beds

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -23,8 +24,12 @@ __all__ = ["campaign_tiles", "inspection_tiles", "write_campaign_report", "write
 _MOST = 12
 """Trials drawn at most; of a campaign that is checked those with findings first."""
 _MOST_LINES = 60
-_SLIVER = 0.01  # share of a recording below which a finding has a mark above it
 """Recordings in the chart of what is there."""
+_SLIVER = 0.01  # share of a recording below which a finding has a mark above it
+_UNCOVERED = 0.02
+"""Share of a trial's time from which on a sensor that begins later or ends earlier than the others is shown."""
+_THICKEST, _THINNEST = 2.2, 0.9
+"""Lines of the first condition drawn and of the last: runs under others are seen on both sides of these."""
 #: (sensor, column, factor, label, channel of findings)
 _TUMBLE = (
     ("pose", "x_m", 1e3, "x [mm]", "x"),
@@ -97,7 +102,8 @@ def write_inspection_report(report: Report) -> Path:
     result = report.result
     drawing = (_draw_tumbles if result["kind"] == "tumble" else _draw_penetrations)(report)
     drawn = [report.draw("inspection_recordings", drawing, name="recordings")]
-    drawn.append(report.draw("coverage", _draw_coverage(result)))
+    if _has_holes(result):
+        drawn.append(report.draw("coverage", _draw_coverage(result)))
     (trials,) = result["tables"]
     head = ("recording", "rows", "rate [Hz]", "from [s]", "to [s]", "rows with gaps", "longest gap [s]")
     found = [capital(what) + "." for what in result["warnings"]]
@@ -107,7 +113,7 @@ def write_inspection_report(report: Report) -> Path:
         Section("Findings", [listing(found) if found else text("Nothing odd was found in the recordings."), *said]),
         Section("", [table(trials["head"], rows, title="Trials", words=True)]),
         Section("The recordings", [*drawn, table(head, [_row(entry) for entry in result["recordings"]])]),
-        again("hedgebed campaign check run.toml", ""),
+        again("hedgebed campaign check THIS_FOLDER/run.toml", "From where it was started:"),
     ]
     return report.write(
         sections, lead=["campaign check", str(result["kind"])], tiles=inspection_tiles(result), warnings=()
@@ -201,10 +207,12 @@ def _draw_penetrations(report: Report) -> Figure:
     rows = len(plans) // 2
     drawing, axes = sheet(rows, 2, 2.7 * rows + 0.1 * len(trials))
     styles, handles = _lines(result, trials)
+    files = {trial["id"]: _files(report, trial["id"])["data"] for trial in trials}
+    widths = _widths(files, trials)
     for axis, (chosen, across, wide, below, up, tall, label, channel) in zip(axes.ravel(), plans, strict=True):
-        for trial in chosen:
-            columns = _files(report, trial["id"])["data"]
-            axis.plot(wide * columns[across], tall * columns[up], lw=0.9, **styles[trial["id"]])
+        for trial in sorted(chosen, key=lambda trial: -widths[trial["id"]]):
+            columns = files[trial["id"]]
+            axis.plot(wide * columns[across], tall * columns[up], lw=widths[trial["id"]], **styles[trial["id"]])
             for finding in result["findings"]:
                 if finding["trial"] != trial["id"] or finding["from_s"] is None:
                     continue
@@ -218,6 +226,35 @@ def _draw_penetrations(report: Report) -> Figure:
         axis.set(xlabel=below, ylabel=label)
     legend_above(drawing, handles, 2, fontsize=7.5)
     return drawing
+
+
+def _widths(files: Mapping[str, Mapping[str, Array]], trials: Sequence[Result]) -> dict[str, float]:
+    """Width of each trial's line: the deepest is the thickest and drawn first, so that no run hides another; replicates
+    have the same."""
+    depths: dict[str, float] = {}
+    for trial in trials:
+        deepest = float(np.nanmax(files[trial["id"]]["depth_m"], initial=-math.inf))
+        depths[trial["condition"]] = max(depths.get(trial["condition"], -math.inf), deepest)
+    order = sorted(depths, key=lambda condition: -depths[condition])
+    widths = np.linspace(_THICKEST, _THINNEST, len(order)) if len(order) > 1 else [_THINNEST]
+    width = dict(zip(order, map(float, widths), strict=True))
+    return {trial["id"]: width[trial["condition"]] for trial in trials}
+
+
+def _has_holes(result: Result) -> bool:
+    """Whether the chart of recorded times shows more than that every trial was recorded: gaps, findings, sensors of a
+    trial that do not cover the same time."""
+    if any(finding["from_s"] is not None for finding in result["findings"]):
+        return True
+    ends: dict[str, list[tuple[float, float]]] = {}
+    for entry in result["recordings"]:
+        if entry["gaps"]:
+            return True
+        ends.setdefault(entry["trial"], []).append((entry["from_s"], entry["to_s"]))
+    return any(
+        any(np.ptp(side) > _UNCOVERED * (max(last) - min(first)) for side in (first, last))
+        for first, last in (zip(*spans, strict=True) for spans in ends.values())
+    )
 
 
 def _draw_coverage(result: Result) -> Figure:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import tomllib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,24 +13,21 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
-from matplotlib.ticker import LogLocator, NullLocator
 from numpy.typing import NDArray
 
 from rigid.series import read_series
-from vis.diagnose.held_out import worsens_held_out
-from vis.page.plots import AMENDED, DASHED, GREY, INK, MODEL, PHASES, STATES, Array, handle, legend_above, sheet
+from vis.page.plots import AMENDED, DASHED, GREY, INK, PHASES, STATES, Array, handle, legend_above, sheet
 from vis.page.report import Result
 from vis.page.sentences import Sentences
 from vis.page.states import state_runs
 
 __all__ = [
-    "Channel", "draw_evidence", "draw_latent", "draw_phases", "draw_trajectories", "read_channel", "source_of",
-    "trials_of", "worst",
+    "BASE", "Channel", "NARROW", "draw_latent", "draw_phases", "draw_trajectories", "plain_numbers", "read_channel",
+    "source_of", "trials_of", "worst",
 ]  # fmt: skip
 
 labels = Sentences(__package__, "labels.toml")
 _MOST_ROWS = 6
-_MOST_BARS = 14
 #: channel -> (what it is, unit)
 _QUANTITIES: dict[str, tuple[str, str]] = {
     "x": ("x", "mm"),
@@ -44,14 +41,22 @@ _QUANTITIES: dict[str, tuple[str, str]] = {
     "force": ("force", "N"),
     "accel": ("acceleration", "m/s²"),
 }
-_REPLICATES = "#e6d08f"  # by what replicates differ: darker than the page and than the band of the sensor
+_REPLICATES = "#c9def2"
+"""By what replicates differ: no colour of a phase, and lighter than the band of the sensor, which lies on it."""
+_SENSOR = "#a3b1be"
+_MOST_DOTS = 300
+"""Dots of one recording: so many that a step of the force while the drive stops is seen."""
+_SPIKE = 3
+"""Rows of the base model's line in a panel from which on it is drawn: fewer are the end of a spike from outside it."""
 BASE = "#7B3FF2"
 """The base model: not the colour of the spring-damper in other figures, which is that of the state "slip" here."""
 _PHASES = STATES | PHASES
 """Of a tumble the colours that its states have everywhere, of a push those of its phases."""
+TRIALS = "trials"
+"""What dots are called where nothing says how the trials came about."""
 _FACTORS = {"mm": 1e3, "degrees": 180 / math.pi}
 """What a number in SI is multiplied by to be in a unit."""
-_NARROW = 3.0
+NARROW = 3.0
 """Range of chi-square up to which its axis is linear."""
 _BINS = 20
 _OUT, _HELD = 0.05, 0.5
@@ -111,10 +116,10 @@ def read_channel(path: Path) -> Channel:
 
 
 def source_of(folder: Path) -> str:
-    """How the trials of a diagnosis came about: "simulated on grains", "simulated", "as recorded (CMU)" or "as given".
+    """How the trials of a diagnosis came about: "simulated on grains", "simulated", "as recorded (CMU)" or "trials".
 
     hedgebed signs the campaigns that it makes: `made_by` in the notes of campaign.toml, which model.toml repeats. A
-    campaign without its signature is as recorded, if its notes say by whom (`recorded_by`), else as given: measured or
+    campaign without its signature is as recorded, if its notes say by whom (`recorded_by`), else "trials", measured or
     not. Without model.toml the word is "recorded".
     """
     path = folder / "model.toml"
@@ -123,12 +128,13 @@ def source_of(folder: Path) -> str:
     notes = tomllib.loads(path.read_text(encoding="utf-8")).get("notes", {})
     made_by = str(notes.get("made_by", ""))
     if not made_by.startswith("hedgebed "):
-        return f"as recorded ({notes['recorded_by']})" if "recorded_by" in notes else "as given"
+        return f"as recorded ({notes['recorded_by']})" if "recorded_by" in notes else TRIALS
     return "simulated on grains" if " penetrate, grains" in made_by or " on a bed of " in made_by else "simulated"
 
 
 def trials_of(folder: Path) -> str:
-    """What the trials of a diagnosis are, as titles have it: the campaign's name, surface, gravities, their source.
+    """What the trials of a diagnosis are, as titles have it: the campaign's name, surface, gravities; their source
+    where it is known.
 
     Empty without model.toml.
     """
@@ -144,7 +150,8 @@ def trials_of(folder: Path) -> str:
     if found:
         ends = dict.fromkeys(f"{gravity:.3g}" for gravity in (min(found), max(found)))
         words += f", {' to '.join(ends)} m/s\N{SUPERSCRIPT TWO}"
-    return f"Trials of {words}: {source_of(folder)}"
+    source = source_of(folder)
+    return f"Trials of {words}" + ("" if source == TRIALS else f": {source}")
 
 
 def worst(channels: Sequence[Channel], held: set[str]) -> list[Channel]:
@@ -195,16 +202,19 @@ def draw_trajectories(
         place = time if depth is None else depth
         if depth is not None and c.goes_in:
             time, over_time = depth, "depth [mm]"
-        step = max(1, len(time) // 80)
+        step = max(1, len(time) // _MOST_DOTS)
         if c.scatter is not None:
             wide = 2 * np.hypot(1.0, c.scatter / c.std_after)
             right.fill_between(time, -wide, wide, color=_REPLICATES, lw=0, zorder=0)
-        right.axhspan(-2, 2, color="#e3e8ec", lw=0)
+        right.axhspan(-2, 2, color=_SENSOR, lw=0, zorder=0.5)
         for stage, colour, dash, _ in models:
             left.plot(place, factor * c.model(stage), color=colour, ls=dash, lw=1.4, zorder=3)
-            right.plot(time, c.residual(stage), color=colour, lw=0.8, ls="-")
-        left.plot(place[::step], factor * c.measured[::step], ".", color=INK, ms=2.6, zorder=4)
-        if len(models) > 1:  # the base model leaves so much that the other line would lie on 0
+            rest = c.residual(stage)
+            if stage == "before" and len(models) > 1:  # it leaves so much that the other line would lie on 0
+                rest = _within(rest, *_range_of(c))
+            right.plot(time, rest, color=colour, lw=0.8, ls="-")
+        left.plot(place[::step], factor * c.measured[::step], ".", color=INK, ms=2.0, zorder=4)
+        if len(models) > 1:
             right.set_ylim(*_range_of(c))
         for axis in (left, right):
             low, high = axis.get_ylim()
@@ -218,7 +228,7 @@ def draw_trajectories(
         right.set_ylabel("left over [std]", fontsize=8.5)
     handles: list[Any] = [handle(source, INK, ls="", marker=".")]
     handles += [handle(label, colour, ls=dash) for _, colour, dash, label in models]
-    handles.append(Patch(color="#e3e8ec", label="2 std of the sensor"))
+    handles.append(Patch(color=_SENSOR, label="2 std of the sensor"))
     if any(c.scatter is not None for c in channels):
         handles.append(Patch(color=_REPLICATES, label="2 std of sensor and replicates"))
     handles += _phase_handles(phase for c in channels for phase in c.phase)
@@ -234,6 +244,15 @@ def _range_of(channel: Channel) -> tuple[float, float]:
     low, high = (float(known.min()), float(known.max())) if len(known) else (0.0, 0.0)
     low, high = min(low, -wide), max(high, wide)
     return low - 0.15 * (high - low), high + 0.15 * (high - low)
+
+
+def _within(values: Array, low: float, high: float) -> Array:
+    """`values` in a panel from `low` to `high`, NaN outside it and in the tips of spikes that come from outside."""
+    shown = np.where((values >= low) & (values <= high), values, np.nan)
+    for begin, end, inside in state_runs(np.where(np.isfinite(shown), "inside", "")):
+        if inside and end - begin < _SPIKE:
+            shown[begin:end] = np.nan
+    return shown
 
 
 def _strip(axis: Axes, time: Array, phase: NDArray[np.str_]) -> None:
@@ -280,11 +299,11 @@ def draw_phases(rows: Sequence[Result], labels: tuple[str, str]) -> Figure | Non
                 axis.plot(after, place, "o", color=AMENDED, ms=5.5, zorder=4)
             axis.plot(before, place, "D", color=BASE, ms=4.8, zorder=3)
         shown = [float(row[stage]) for row in rows for stage in ("before", "after")]
-        if max(shown) < _NARROW:
+        if max(shown) < NARROW:
             axis.set_xlim(0.0, 1.1 * max(*shown, 1.5))
         else:
             axis.set_xscale("log")
-            axis.xaxis.set_major_formatter(_plain_numbers)
+            axis.xaxis.set_major_formatter(plain_numbers)
         axis.set(title=title, xlabel="chi-square per sample (1: the sensors' noise)")
     axes[0].set_yticks(range(len(keys)), [f"{channel}, {phase}" for channel, phase in keys])
     axes[0].set_ylim(len(keys) - 0.4, -0.6)
@@ -295,116 +314,9 @@ def draw_phases(rows: Sequence[Result], labels: tuple[str, str]) -> Figure | Non
     return drawing
 
 
-# Candidates -----------------------------------------------------------------------------------------------------------
-
-
-def draw_evidence(diagnosis: Result) -> Figure | None:
-    """Bars of evidence, and what each candidate leaves: the best form of each single name, and the best sets of names
-    that beat all of their parts."""
-    best: dict[tuple[str, ...], Result] = {}
-    orders: dict[frozenset[str], tuple[str, ...]] = {}  # one set of names, in whatever order they were added
-    for row in (*diagnosis.get("candidates", []), *diagnosis.get("evidence", [])):
-        best.setdefault(orders.setdefault(frozenset(row["effects"]), tuple(row["effects"])), row)
-    if not best:
-        return None
-    score = {names: float(row["score"]) for names, row in best.items()}
-    leading = _leading_names(diagnosis, score)
-    leading = orders.get(frozenset(leading), leading)
-    singles = [names for names in best if len(names) == 1]
-    sets = [
-        names
-        for names in best
-        if len(names) > 1 and all(score[names] > score.get((name,), -math.inf) + 0.05 for name in names)
-    ]
-    names = sorted({*singles, *sets[:5], *([leading] if leading in best else [])}, key=lambda n: (score[n], -len(n)))
-    names = names[-_MOST_BARS:]
-    drawing, ((axis, beside),) = sheet(1, 2, 1.3 + 0.27 * len(names), sharey=True, width_ratios=(3, 2))
-    kinds = {name: _kind(name, leading, diagnosis) for name in names}
-    colours = {name: _KINDS[kinds[name]] for name in names}
-    places = range(len(names))
-    axis.barh(places, [score[name] for name in names], color=[colours[n] for n in names], height=0.66)
-    most = max(*(score[name] for name in names), 1.0)
-    for place, name in enumerate(names):
-        axis.annotate(f"{score[name]:z.1f}" if abs(score[name]) < 10 else f"{score[name]:.0f}",
-                      (max(score[name], 0.0), place), xytext=(3, 0), textcoords="offset points", va="center",
-                      fontsize=7.5, color=INK)  # fmt: skip
-    least = min(score[name] for name in names)  # one that is far off does not press the others together
-    axis.set_xlim(max(1.1 * least, -0.3 * most) if least < 0 else 0.0, 1.12 * most)
-    axis.axvline(0.0, color=INK, lw=0.9)
-    axis.set_yticks(places, [" + ".join(name) for name in names])
-    axis.grid(False, axis="y")
-    axis.set_xlabel("log evidence over the base model [nats]\n(left of 0: not worth its parameters)")
-    _draw_left(beside, [best[name] for name in names], [colours[name] for name in names], diagnosis)
-    shown = [kind for kind in _KINDS if kind in kinds.values()]
-    handles: list[Any] = [Patch(color=_KINDS[kind], label=kind) for kind in shown]
-    handles.append(handle("the noise alone", INK, ls=(0, (1, 1.5))))
-    handles.append(handle("the base model", BASE, ls=DASHED))
-    legend_above(drawing, handles, 5, fontsize=8)
-    return drawing
-
-
-_WORSE = "fits best, but predicts held-out trials worse than the base model"
-_KINDS = {"named": AMENDED, "with confidence": AMENDED, "most likely, without confidence": "#80cfb9", _WORSE: "#d9b87f",
-          "cannot be distinguished from it": MODEL, "other": "#b5b5b5"}  # fmt: skip
-"""What a candidate is -> its colour."""
-
-
-def _draw_left(axis: Axes, rows: Sequence[Result], colours: Sequence[str], diagnosis: Result) -> None:
-    """Chi-square a sample that each candidate leaves, between that of the base model and that of the noise."""
-    base = diagnosis.get("evidence_base", {})
-    left = [max(1 + float(row["left"]), 1e-2) for row in rows]
-    axis.axvline(1.0, color=INK, lw=1.0, ls=(0, (1, 1.5)))
-    whole = 1 + float(base["left"]) if base else max(left)
-    axis.axvline(whole, color=BASE, lw=1.0, ls=DASHED)
-    most = max(whole, *left)
-    for place, (row, value, colour) in enumerate(zip(rows, left, colours, strict=True)):
-        axis.plot([whole, value], [place, place], color=GREY, lw=1.0, zorder=2)
-        axis.plot(value, place, "o", color=colour, ms=5.5, zorder=3)
-        closes = row.get("closes")
-        if closes is not None:
-            share = f"{100 * min(max(closes, 0.0), 1.0):.0f} %"
-            axis.annotate(share, (1.01, place), xycoords=("axes fraction", "data"), va="center", fontsize=7.5,
-                          color=INK, annotation_clip=False)  # fmt: skip
-    if most < _NARROW:
-        low = min(1.0, *left)
-        axis.set_xlim(low - 0.1 * max(most - low, 0.1), most + 0.1 * max(most - low, 0.1))
-    else:
-        axis.set(xscale="log", xlim=(min(0.9, 0.9 * min(left)), 1.15 * most))
-        axis.xaxis.set_major_formatter(_plain_numbers)
-        if most < 20:
-            axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-            axis.xaxis.set_minor_locator(NullLocator())
-    noise = "noise and replicates" if base.get("with_scatter") else "noise"
-    axis.set_xlabel(f"chi-square per sample left\n(1: {noise}; %: gap closed)")
-    axis.grid(False, axis="y")
-
-
-def _plain_numbers(value: float, place: float) -> str:
+def plain_numbers(value: float, place: float) -> str:
+    """A number on a logarithmic axis."""
     return f"{value:g}" if 1e-3 <= value < 1e5 else f"{value:.0e}"
-
-
-def _leading_names(diagnosis: Result, score: Mapping[tuple[str, ...], float]) -> tuple[str, ...]:
-    """The leading set of names: the verdict's; where that is unknown the best model's, or the likeliest single name."""
-    if diagnosis["verdict"] != "unknown":
-        return tuple(effect["id"] for effect in diagnosis["effects"])
-    names = tuple(diagnosis.get("leading", {}).get("effects", ()))
-    same = next((known for known in score if sorted(known) == sorted(names)), names)
-    singles = [known for known in score if len(known) == 1 and score[known] > 0]
-    return same or max(singles, key=lambda known: score[known], default=())
-
-
-def _kind(name: tuple[str, ...], leading: tuple[str, ...], diagnosis: Result) -> str:
-    if diagnosis["verdict"] == "unknown":
-        certain = {effect["id"] for effect in diagnosis["effects"]}
-        if worsens_held_out(diagnosis):
-            return _WORSE if name == leading else "other"
-        if certain and set(name) == certain:
-            return "with confidence"
-        return "most likely, without confidence" if name == leading else "other"
-    if name == leading:
-        return "named"
-    swapped = [(other, *leading[1:]) for other in diagnosis["alternatives"]]
-    return "cannot be distinguished from it" if set(name) in [set(s) for s in swapped] else "other"
 
 
 # What no effect explains ----------------------------------------------------------------------------------------------

@@ -6,8 +6,8 @@ import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from vis.diagnose.evidence import closed_share, draw_evidence
 from vis.diagnose.figures import (
-    draw_evidence,
     draw_latent,
     draw_phases,
     draw_trajectories,
@@ -260,7 +260,7 @@ def _evidence(diagnosis: Result) -> list[Block]:
         return [text("Nothing was left that a candidate could explain: none was tried.")]
     better = [
         (row["candidate"], f"{row['score']:.1f}", _DASH if row["left"] is None else f"{row['left']:.3g}",
-         _DASH if row["closes"] is None else f"{100 * min(max(row['closes'], 0.0), 1.0):.0f} %", str(row["tried"]),
+         _DASH if row["closes"] is None else closed_share(row["closes"]), str(row["tried"]),
          row["note"])
         for row in rows if row["better"]
     ]  # fmt: skip

@@ -6,6 +6,7 @@ positive downwards. `templates/report.html` is the page; its content is from `vi
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 
 from vis.page.answer import answer
 from vis.page.folder import Run, RunFolder, Series, from_python, read_folder
@@ -22,7 +24,7 @@ from vis.page.page import Block, Section, Tile, figure, table, text, write_templ
 from vis.page.plots import AMENDED, BED, DASHED, GREY, MODEL, handle, legend_above, sheet, styled, title_above
 from vis.page.report import Progress, Report, again, report_of, title_of
 from vis.penetrate.answer import answer_tiles, words_of_effects
-from vis.penetrate.errors import error_words
+from vis.penetrate.errors import error_words, half_of
 from vis.penetrate.plot_drag import Plot, drag_plot, gap_plot, work_plot
 from vis.penetrate.plot_drops import drop_peaks_plot, drops_plot, set_down_plot, spread_plot
 from vis.penetrate.summary import summarise
@@ -32,6 +34,8 @@ from vis.view.page import report_scene
 
 __all__ = ["PLOTS", "draw_amended", "make_plots", "words_of_effects", "write_penetration_report"]
 
+_BEYOND = 1.02
+"""Factor beyond the deepest reading of a fit from which on a picture marks where its data end."""
 _MOST = 4
 """Panels in a row at most."""
 #: Plot -> the kind of run it is of.
@@ -173,10 +177,13 @@ def draw_amended(run: RunFolder, *, base: str = MODEL) -> Figure | None:
     if not groups:
         return None
     drawing, axes = sheet(len(groups), max(map(len, groups)), 2.7 * len(groups))
+    deepest, marked = (None, []) if alone else (_fitted_depth(run), list[Any]())
     for row, group in zip(axes, groups, strict=True):
         for axis, (title, runs) in zip(row, group, strict=False):
             axis.set_title(title)
             _draw_panel(axis, runs, base)
+            if not alone and runs[0].kind == "driven":
+                marked += _draw_peak(axis, runs[0], run.result["quantities"], deepest)
             if axis is not row[0]:
                 axis.set_ylabel("")
         for axis in row[len(group) :]:
@@ -184,8 +191,41 @@ def draw_amended(run: RunFolder, *, base: str = MODEL) -> Figure | None:
     handles = [handle("bed", BED, lw=1.0)] if any(r.bed is not None for r in run.runs) else []
     laws = [handle(str(run.result["ground"]) if alone else "spring-damper", base, ls=DASHED)]
     laws += [] if alone else [handle(f"with {words_of_effects(run.result)}", AMENDED)]
-    legend_above(drawing, [*handles, *laws], 3)
+    named = {str(mark.get_label()): mark for mark in marked}
+    legend_above(drawing, [*handles, *laws, *named.values()], 3)
     return drawing
+
+
+def _fitted_depth(run: RunFolder) -> float | None:
+    """The deepest reading that the model was fitted to [m], from the run's copy of it; None where it has none."""
+    path = run.path / "model.toml"
+    notes = tomllib.loads(path.read_text(encoding="utf-8")).get("notes", {}) if path.exists() else {}
+    found = mapping_of(notes.get("fitted_range")).get("depth_m")
+    return float(found) if isinstance(found, int | float) else None
+
+
+def _draw_peak(axis: Axes, run: Run, numbers: Mapping[str, Any], deepest: float | None) -> list[Any]:
+    """The predicted peak force of a push with its number and 95 % interval, and the depth where the data of the fit
+    end; what a legend shows of both."""
+    law, shown = run.amended, list[Any]()
+    if law is None:
+        return shown
+    entry = numbers.get(f"peak_force_amended@{run.speed:g}", numbers.get("peak_force_amended"))
+    if entry is not None and entry["value"] is not None:
+        place = 1e3 * float(law.depth[int(np.argmax(law.force))])
+        value, half = float(entry["value"]), half_of(entry)
+        label = "peak force, 95 % interval" if half else "peak force"
+        bar = axis.errorbar(place, value, yerr=half or None, fmt="o", color=AMENDED, capsize=4, ms=4, zorder=5)
+        bar.set_label(label)
+        shown.append(bar)
+        axis.annotate(
+            quote(value, half, "N"), (place, value), xytext=(-8, 2), textcoords="offset points", ha="right", fontsize=8
+        )
+    if deepest is not None and float(law.depth.max()) > _BEYOND * deepest:
+        axis.set_xlim(axis.get_xlim())
+        axis.axvspan(1e3 * deepest, axis.get_xlim()[1], color="#eeeeee", lw=0, zorder=0)
+        shown.append(Patch(color="#dddddd", label="deeper than the data of the fit"))
+    return shown
 
 
 @report_of(named=True)

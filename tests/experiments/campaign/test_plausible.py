@@ -133,7 +133,9 @@ def test_a_mistake_in_a_tumble_is_said_once_by_its_cause(changes, tables, said):
 def test_a_number_of_a_push_in_other_units_is_said(table, change, said):
     """Millimetres, N/mm and grams: a newcomer's campaign passed with all three."""
     campaign = read_campaign(TEMPLATES / "template-penetration")
-    tables = campaign.tables.model_copy(update={table: getattr(campaign.tables, table).model_copy(update=change)})
+    known = campaign.tables.uncertainty.model_copy(update={"stiffness": 0.1, "damping": 0.2})
+    changed_table = getattr(campaign.tables, table).model_copy(update=change)
+    tables = campaign.tables.model_copy(update={"uncertainty": known, table: changed_table})
     told = [finding.what for finding in find_faults(replace(campaign, tables=tables))]
     assert any(said in what for what in told), told
 
@@ -168,6 +170,12 @@ def test_a_torque_that_comes_up_in_0_12_s_is_a_possible_effect():
     (said,) = [finding for finding in find_implausible(only) if finding.channel == "wheel"]
     assert said.maybe_effect and "torque-rise" in said.what
     golden("campaign/slow_wheel", said.what)
+
+
+def test_the_template_of_pushes_ties_no_fit_to_its_made_up_stiffness():
+    """1 or more: not known beforehand, fitted freely."""
+    stated = read_campaign(TEMPLATES / "template-penetration").tables.uncertainty
+    assert min(stated.stiffness, stated.damping) >= 1.0
 
 
 def test_nothing_is_wrong_with_the_templates():

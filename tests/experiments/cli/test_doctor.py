@@ -71,6 +71,14 @@ def test_a_machine_without_opengl_or_peers_is_well_enough(machine, capsys):
         assert expected in text
 
 
+def test_each_thing_that_only_some_commands_need_says_so(machine, monkeypatch):
+    monkeypatch.setattr(doctor, "unknown_processor", lambda: True)
+    monkeypatch.setattr(doctor, "chosen", lambda: "taichi")
+    absent = [f for f in doctor.examine() if not f.ok and f.name not in ("Python", "memory", "cache of beds")]
+    assert {"processor", "YADE", "LAMMPS", "backend vulkan"} <= {finding.name for finding in absent}
+    assert all(finding.remedy.startswith("not needed") for finding in absent)
+
+
 def test_a_machine_where_taichi_does_not_run_is_not(machine, capsys):
     machine["cpu"] = {"ok": False, "reason": "No module named 'taichi'"}
     assert cli.main(["doctor", "--json"]) == 1

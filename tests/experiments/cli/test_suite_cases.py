@@ -234,3 +234,9 @@ def test_a_mistyped_case_names_those_spelt_like_it_and_an_unlike_one_those_of_th
     assert all(find_case(Path(name), CASES).is_file() for name in near)
     with pytest.raises(ValueError, match=r"that ship are bed-make, .* and \d+ that `hedgebed experiments list` names"):
         find_case(Path("zzz"), CASES)
+
+
+@pytest.mark.parametrize("second", ["24mm", "0.024", "1e-3g", "-3", "5m/s"])
+def test_a_second_value_of_an_option_is_not_taken_for_the_name_of_a_case(second):
+    with pytest.raises(ValueError, match="an option takes one value"):
+        find_case(Path(second), CASES)

@@ -28,7 +28,7 @@ from experiments.diagnose.report.sentences import (
 )
 from experiments.diagnose.report.summary import _numbers, scatter_sentence, summary_sentences, title_words
 from rigid.terms import CANDIDATES
-from vis.diagnose.figures import _kind
+from vis.diagnose.evidence import _kind
 
 
 def test_chi_square_by_phase_is_that_of_the_residuals_of_all_trials_of_a_kind():

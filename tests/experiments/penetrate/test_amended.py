@@ -10,7 +10,7 @@ from golden import golden
 
 from dem.grains.materials import Material
 from experiments.campaign import read_campaign
-from experiments.campaign.tables import BASE_NOTE, ERRORS_NOTE, OTHERS_NOTE, PEAKS_NOTE, SCATTER_NOTE
+from experiments.campaign.tables import BASE_NOTE, ERRORS_NOTE, OTHERS_NOTE, PEAKS_NOTE, RANGE_NOTE, SCATTER_NOTE
 from experiments.cli.main import main
 from experiments.penetrate import beds
 from experiments.penetrate import experiment as penetrate
@@ -18,6 +18,8 @@ from experiments.penetrate.amended import AmendedGround, read_law
 from experiments.penetrate.settings import PenetrateSettings
 from experiments.penetrate.units import make_run, plan_units
 from rigid.intervals import student
+from vis.page.folder import read_folder
+from vis.penetrate.report import draw_amended
 
 K, C, MASS, LOAD = 120.0, 0.5, 0.3, 0.4
 MODEL = f"""
@@ -220,6 +222,26 @@ def test_one_push_is_predicted_alone_as_it_was_asked_for(tmp_path, capsys):
     assert "0.23&nbsp;N" in (page := (tmp_path / "run" / "report.html").read_text()) or "0.23\xa0N" in page
     again = PenetrateSettings(ground="spring-damper", model=str(tmp_path / "model.toml"), speeds=(0.02,), load=0.1)
     assert again.retreat_speed == 0.02 and {unit.kind for unit in plan_units(again)} == {"driven", "set_down"}
+
+
+@pytest.mark.parametrize(("deepest", "marked"), [(0.008, True), (0.01, False), (None, False)])
+def test_the_picture_of_a_prediction_has_the_peak_with_its_interval_and_marks_where_the_data_end(
+    tmp_path, deepest, marked
+):
+    note = f'[notes.{ERRORS_NOTE}]\nnames = ["stiffness"]\nstd = [12.0]\ncorrelation = [[1.0]]\nundetermined = []\n'
+    note += "" if deepest is None else f"[notes.{RANGE_NOTE}]\ndepth_m = {deepest}\n"
+    (tmp_path / "model.toml").write_text(MODEL + note)
+    settings = PenetrateSettings(ground="spring-damper", model=str(tmp_path / "model.toml"), speeds=(0.05,),
+                                 drop_speeds=(), load=None, depth=0.01)  # fmt: skip
+    penetrate.run(settings, tmp_path / "run")
+    drawing = draw_amended(read_folder(tmp_path / "run"))
+    (panel,) = drawing.axes
+    assert [text.get_text().replace("\xa0", " ") for text in panel.texts] == ["1.22 ± 0.23 N"]
+    (bar,) = panel.containers
+    low, high = bar[2][0].get_segments()[0][:, 1]
+    assert (high - low) / 2 == pytest.approx(1.96 * 12.0 * 0.01, rel=0.01)
+    legend = [text.get_text() for text in drawing.legends[0].get_texts()]
+    assert any("deeper" in words for words in legend) is marked and len(panel.patches) == marked
 
 
 def test_the_scatter_of_beds_is_in_the_error_of_a_peak_where_the_model_knows_it(tmp_path):

@@ -10,10 +10,10 @@ from experiments.diagnose.report.summary import summary_sentences
 from experiments.diagnose.settings import CheckSettings
 
 
-def pushes(depths):
+def pushes(depths, speeds=(0.01, 0.01, 0.01)):
     trials = [
-        (f"{k}", "driven", 0.01, driven_trial(lambda z, v, top: 900 * z, speed=0.01, depth=depth, seed=k))
-        for k, depth in enumerate(depths)
+        (f"{k}", "driven", speed, driven_trial(lambda z, v, top: 900 * z, speed=speed, depth=depth, seed=k))
+        for k, (depth, speed) in enumerate(zip(depths, speeds, strict=True))
     ]
     return campaign_of(trials)
 
@@ -31,6 +31,13 @@ def test_the_check_counts_as_alike_what_the_diagnosis_takes_for_replicates(tmp_p
     if said:
         assert "speed and depth" in said[0]
         assert said[0] in (tmp_path / "run" / "report.html").read_text()
+
+
+def test_each_push_has_its_depth_where_some_speeds_go_to_several(tmp_path):
+    campaign = pushes((0.012, 0.018, 0.112), (0.01, 0.01, 0.02))
+    result = check_campaign(CheckSettings(campaign=str(saved(tmp_path / "c", campaign))), tmp_path / "run")
+    words = [trial["condition"].split(", ")[-1] for trial in result["trials"]]
+    assert words == ["12 mm deep", "18 mm deep", "112 mm deep"]
 
 
 def test_a_diagnosis_without_replicates_says_what_it_cannot_find():
