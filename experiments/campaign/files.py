@@ -11,7 +11,7 @@ model = read_model("model.toml")                  # the same tables with [[effec
 
 import shutil
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import chain
 from pathlib import Path
@@ -58,6 +58,8 @@ __all__ = [
 MODEL_COPY = "model.toml"
 """The model that was run, in the run's folder; effects of one's own are beside it."""
 TEMPLATES = Path(__file__).resolve().parent.parent / "examples"
+_LISTED = 12
+"""Files with the same fault that are named; of the rest the number."""
 _CAMPAIGNS: dict[str, type[BaseModel]] = {"tumble": TumbleCampaign, "penetration": PenetrationCampaign}
 _MODELS: dict[str, type[BaseModel]] = {"tumble": TumbleModel, "penetration": PenetrationModel}
 
@@ -97,18 +99,29 @@ def read_campaign(folder: str | Path) -> Campaign:
     else:
         assert isinstance(tables, TumbleCampaign | PenetrationCampaign)
         trials = list(enumerate(tables.trial, 1))
-    recordings = {}
+    recordings, of_files = {}, dict[str, list[str]]()
     for _, trial in trials:
         for sensor, name in trial.files.items():
             try:
                 recordings[trial.id, sensor] = read_recording(folder / name, trial.columns(sensor))
             except ValueError as error:
-                faults += str(error).splitlines()
+                for line in str(error).splitlines():
+                    of_files.setdefault(line.removeprefix(str(folder / name)), []).append(name)
+    faults += [f"{_files_words(folder, names)}{fault}" for fault, names in of_files.items()]
     recorded = [name for _, trial in trials for name in trial.files.values()]
     faults += changed_files(folder, ["campaign.toml", *recorded])
     if faults or tables is None:
         raise ValueError("\n".join(dict.fromkeys(faults)))
     return Campaign(tables, recordings, folder)
+
+
+def _files_words(folder: Path, names: Sequence[str]) -> str:
+    """The files of one fault: a path, or the folder with the names of several."""
+    names = list(dict.fromkeys(names))
+    if len(names) == 1:
+        return str(folder / names[0])
+    listed = ", ".join(names[:_LISTED]) + (f" and {len(names) - _LISTED} more" if len(names) > _LISTED else "")
+    return f"{folder}: {len(names)} files alike ({listed})"
 
 
 def _find_campaign(given: str | Path) -> Path:

@@ -18,12 +18,11 @@ from numpy.typing import NDArray
 
 from experiments.runs.folder import write_series
 
+from .headers import missing_columns
+
 __all__ = ["Recording", "read_recording", "write_recording"]
 
 _DECIMAL_COMMA = re.compile(r"[-+]?[0-9]+,[0-9]+([eE][-+]?[0-9]+)?")
-_TIME_OF_A_PUSH = (
-    ". A push at one constant speed has the time depth / speed: add the column t_s = depth_m / speed, the speed in m/s"
-)
 _MOST_REPORTED = 5  # faults of one kind of one file; of the rest the number
 _LARGEST = 1e50  # Of a cell, in its unit: powers of a larger one can overflow
 
@@ -77,7 +76,10 @@ def read_recording(path: Path, wanted: Sequence[tuple[str, str]]) -> Recording:
     faults = _other_csv(path, header, rows) or _header_faults(path, header)
     if faults:
         raise ValueError("\n".join(faults))
-    columns_found = [_find_column(path, header, name, unit) for name, unit in wanted]
+    missing = [(name, _UNITS[unit]) for name, unit in wanted if not _columns_of(header, name, unit)]
+    faults += [f"{path}, line 1: {missing_columns(header, missing)}"] if missing else []
+    absent = [name for name, _ in missing]
+    columns_found = [_find_column(path, header, name, unit) for name, unit in wanted if name not in absent]
     faults += [found for found in columns_found if isinstance(found, str)]
     chosen = [found for found in columns_found if not isinstance(found, str)]
     expected = f"cells, expected {len(header)} as in the header"
@@ -171,15 +173,17 @@ def _header_faults(path: Path, header: list[str]) -> list[str]:
 
 def _find_column(path: Path, header: list[str], name: str, unit: str) -> tuple[int, Conversion] | str:
     """Where a quantity stands and what converts it, or what is wrong."""
-    known = {f"{name}_{there}": convert for there, convert in _UNITS[unit].items()}
-    found = [column for column in header if column in known]
-    if not found:
-        held = ", ".join(column for column in header if column)
-        made = _TIME_OF_A_PUSH if name == "t" and any(column.lower().startswith("depth") for column in header) else ""
-        return f"{path}, line 1: column {' or '.join(known)} is missing; found {held}{made}"
+    found = _columns_of(header, name, unit)
     if len(found) > 1:
         return f"{path}, line 1: columns {' and '.join(found)} are the same quantity, one was expected"
-    return header.index(found[0]), known[found[0]]
+    ((column, convert),) = found.items()
+    return header.index(column), convert
+
+
+def _columns_of(header: list[str], name: str, unit: str) -> dict[str, Conversion]:
+    """Columns that are a quantity in one of its units, and what converts them."""
+    known = {f"{name}_{there}": convert for there, convert in _UNITS[unit].items()}
+    return {column: known[column] for column in header if column in known}
 
 
 def _number(path: Path, line: int, name: str, cell: str, convert: Conversion, faults: list[str]) -> float:

@@ -18,7 +18,7 @@ from experiments.campaign import (
     write_model,
 )
 from experiments.campaign.digests import DIGESTS
-from experiments.campaign.files import TEMPLATES
+from experiments.campaign.files import TEMPLATES, new_campaign
 
 
 def same_bits(one, other):
@@ -360,3 +360,30 @@ def test_a_campaign_there_is_not_is_refused(tmp_path):
     tumble_folder(tmp_path / "run" / "campaign")
     with pytest.raises(ValueError, match=r"run' is a run folder: its campaign is '.*campaign'"):
         read_campaign(tmp_path / "run")
+
+
+@pytest.mark.parametrize(
+    ("header", "renamed"),
+    [
+        (
+            "time [s],displacement [mm],force [N]",
+            "time [s] to t_s, displacement [mm] to depth_mm, force [N] to force_N",
+        ),
+        ("Time (ms),z_mm,load_mN", "Time (ms) to t_ms, z_mm to depth_mm, load_mN to force_mN"),
+        ("t_s,depth [cm],Force [N]", "Force [N] to force_N"),
+        ("t_s,depth_m,F [kN]", None),
+    ],
+)
+def test_columns_of_another_program_are_refused_once_with_what_to_rename(tmp_path, header, renamed):
+    """Ten files had three lines each. What has no unit of the format is not renamed."""
+    folder = new_campaign(tmp_path / "c", kind="penetration")
+    tables = (folder / "campaign.toml").read_text().split("[[trial]]")[0]
+    for name in ("1", "2", "3"):
+        tables += f'[[trial]]\nid = "{name}"\nmode = "driven"\ndata = "{name}.csv"\n'
+        (folder / f"{name}.csv").write_text(f"{header}\n0,0,0\n1,1,1\n")
+    (folder / "campaign.toml").write_text(tables)
+    with pytest.raises(ValueError) as refused:
+        read_campaign(folder)
+    (line,) = str(refused.value).splitlines()
+    assert "(1.csv, 2.csv, 3.csv)" in line
+    assert line.partition("; rename ")[2] == (renamed or "")
