@@ -121,7 +121,7 @@ def _cache() -> Finding:
 def _opengl(answer: Answer) -> Finding:
     drawn = f"a picture off screen ({answer.get('renderer') or 'renderer unknown'})"
     detail = drawn if answer["ok"] else answer["reason"]
-    remedy = "not needed for results, only for pictures: apt install libegl1 libgl1-mesa-dri, or try again when the machine is less busy"
+    remedy = "not needed for results, only for pictures: apt install libegl1 libgl1-mesa-dri, or try again later"
     return Finding("OpenGL", answer["ok"], detail, remedy)
 
 

@@ -62,7 +62,7 @@ def find_case(given: Path, shipped: Path, commands: Iterable[str] = ()) -> Path:
         raise ValueError(f"{str(given)!r} is neither a command nor a file; did you mean {meant[0]!r}?")
     if _VALUE.fullmatch(str(given)):
         raise ValueError(
-            f"{str(given)!r} is a number where a case file may stand: an option takes one value, unless its help shows more"
+            f"{str(given)!r} is a number, no case file: an option before it takes one value, unless its help shows more"
         )
     own = given if given.suffix else given.with_suffix(".toml")
     if own.parent.is_dir() and (meant_file := alike(own)):
