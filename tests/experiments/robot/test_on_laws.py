@@ -99,6 +99,31 @@ def on_bed():
     return RobotOnBed(settings, plan), plan
 
 
+def test_a_run_that_ends_in_the_crater_of_its_launch_flies_as_a_longer_one_does(tmp_path):
+    """The leg loses contact 47 mm deep. The run ends 6 ms before the foot is at the surface, with the push over."""
+
+    def followed(duration):
+        plan = plan_robot(RobotSettings(**HOPPER, gravity=1.0, duration=duration))
+        run = run_of(plan)
+        run.run()
+        return run, conclude(plan.settings, plan, run, tmp_path)
+
+    whole, longer = followed(1.1)
+    heights = heights_of(whole)[:, 0]
+    (begin, _), *_ = find_flights(whole, heights_of(whole)).rows
+    out = begin + int(np.argmax(heights[begin:] > 0))
+    cut, short = followed(float(whole.columns["time"][out - 15]))
+    assert heights_of(cut)[-1, 0] < -2e-3 and find_flights(cut, heights_of(cut)).at_end and not on_law(cut).rising
+    launches = [
+        [said for said in one["departures"]["sentences"] if "first flight begins" in said] for one in (short, longer)
+    ]
+    assert launches[0] == launches[1] != []
+    for name in ("rise_ballistic", "flight_ballistic"):
+        assert short.quantities[name].value == pytest.approx(longer.quantities[name].value, rel=5e-3)
+    assert not any("pushes off" in one for one in short.warnings)
+    assert any("below the undisturbed surface and lands" in one for one in short.warnings)
+
+
 def test_the_law_beside_a_bed_goes_on_to_its_flight():
     """The push is half done at 0.3 s."""
     beside = on_bed()[0].beside
