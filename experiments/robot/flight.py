@@ -18,7 +18,7 @@ from .settings import RobotSettings
 
 __all__ = [
     "APART", "REST", "Flights", "at_end", "at_rest", "fall_warning", "find_flights", "launched", "pushes_off", "rising",
-    "to_landing", "touch_words",
+    "stays", "to_landing", "touch_words",
 ]  # fmt: skip
 
 APART = 5e-3  # A flight lasts at least that long [s]
@@ -132,6 +132,15 @@ def rising(run: RobotRun, flights: Flights) -> bool:
         return False
     first = int(np.argmax(speeds > _slow(run)))
     return bool(speeds[first:].min() >= -_slow(run) or z[-1] + speeds[-1] ** 2 / (2 * gravity) > z.max() + REST)
+
+
+def stays(run: RobotRun, flights: Flights) -> bool:
+    """Whether a robot stays on the ground from its first touch to the end: its rise is then none of a hop.
+
+    After a fall onto the ground its largest height is that of the first touch. A run that ends while the robot is
+    `rising` does not say it.
+    """
+    return flights.touched is not None and not flights.rows and not rising(run, flights)
 
 
 def pushes_off(run: RobotRun, flights: Flights) -> str | None:

@@ -33,7 +33,7 @@ from .feet import (
     too_deep,
     too_fast,
 )
-from .flight import APART, Flights, at_end, find_flights, launched, pushes_off, to_landing
+from .flight import APART, Flights, at_end, find_flights, launched, pushes_off, rising, stays, to_landing
 from .forms import NO_FORMS, Forms
 from .laws import of_sand
 from .plan import RobotPlan
@@ -194,7 +194,7 @@ def conclude(
         "departures": {"sentences": sentences},
         "trial": {name: vars(number) for name, number in plan.numbers.items()},
         "surface": plan.surface.name, "ground": "bed" if settings.on_grains else plan.law,
-        "duration": settings.duration,
+        "duration": settings.duration, "hop": not stays(run, flights), "rising": rising(run, flights),
         **({"sure": sure} if sure else {}), **({"forms": forms.numbers} if forms.numbers else {}),
         "feet": [foot.name for foot in robot.feet], "feet_reached": feet_reached(run, heights),
         "start_height": float(heights[0].min()),
@@ -357,7 +357,7 @@ def _sentences(run: RobotRun, heights: Array, flights: Flights) -> list[str]:
     lowest = say("rose_from_lowest", rise=1e3 * (_from_lowest(run, flights) or 0.0))
     told.append(say("went", way=1e3 * way, rose=f"{rose} {lowest}"))
     lost = bounce_words(crater_losses(run, heights, apart=APART))
-    stayed = say("stayed_in_crater" if lost else "stayed")
+    stayed = say("still_rises" if rising(run, flights) else "stayed_in_crater" if lost else "stayed")
     flew = say("flew", count=len(flown), apart=1e3 * APART, longest=1e3 * flights.longest) if flown else stayed
     told.append(" ".join([flew, *lost]))
     sinkage, time = rows["sinkage"], rows["time"]

@@ -121,7 +121,30 @@ def test_a_run_that_ends_in_the_crater_of_its_launch_flies_as_a_longer_one_does(
     for name in ("rise_ballistic", "flight_ballistic"):
         assert short.quantities[name].value == pytest.approx(longer.quantities[name].value, rel=5e-3)
     assert not any("pushes off" in one for one in short.warnings)
-    assert any("below the undisturbed surface and lands" in one for one in short.warnings)
+    assert any("surface and lands" in one for one in short.warnings)
+
+
+@pytest.mark.parametrize(
+    ("given", "hop", "up"),
+    [
+        ({"surface": "sand", "height": 0.02, "duration": 0.2}, False, False),
+        (BRICK | {"duration": 0.085}, True, True),
+        (BRICK | {"duration": 0.2}, True, False),
+    ],
+)
+def test_a_robot_that_stays_on_the_ground_has_no_rise_in_a_range_and_its_result_states_it(
+    planned, tmp_path, given, hop, up
+):
+    """On sand the plate falls by 20 mm and stays: the largest height after its first touch is that of the touch."""
+    plan = planned(**given)
+    run = run_of(plan)
+    run.run()
+    result, answer = conclude(plan.settings, plan, run, tmp_path), answer_of_run(run)
+    assert (result["hop"], result["rising"]) == (hop, up)
+    assert (answer["highest"] == answer["clearance_largest"] == 0.0) == (not hop)
+    assert result.quantities["highest"].value == pytest.approx(-0.02, abs=1e-3) or hop
+    told = " ".join(result["departures"]["sentences"])
+    assert ("before the end" in told) == up
 
 
 def test_the_law_beside_a_bed_goes_on_to_its_flight():
