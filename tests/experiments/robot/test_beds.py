@@ -82,8 +82,8 @@ def law_in_place_of_grains(computed):
         write_series(folder.path / "series" / "rft.csv", columns)
         folder.write_result(Result.make(
             "mujoco", title="a robot on a bed of sand", quantities=numbers, code="of grains",
-            departures={"sentences": ["said of all"]}, trial={}, surface="sand", ground="bed", duration=0.12, hop=seed != 2,
-            feet=["foot"], feet_reached={"foot": {"clearance_largest": float(heights.max())}},
+            departures={"sentences": ["said of all"]}, trial={}, surface="sand", ground="bed", duration=0.12,
+            hop=seed != 2, feet=["foot"], feet_reached={"foot": {"clearance_largest": float(heights.max())}},
             warnings=["on all", f"on {seed}"], grains={"seed": seed, "beside": numbers, "beside_law": "rft"},
         ))  # fmt: skip
 

@@ -13,6 +13,7 @@ from experiments.robot.on_laws import answer_of_run, follow_on, on_law
 from experiments.robot.plan import plan_robot
 from experiments.robot.result import conclude
 from experiments.robot.settings import RobotSettings
+from vis.robot.answer import answer_tiles
 
 pytest.importorskip("mujoco", reason="mujoco is not installed: pip install 'hedgebed[mujoco]'")
 
@@ -122,6 +123,9 @@ def test_a_run_that_ends_in_the_crater_of_its_launch_flies_as_a_longer_one_does(
         assert short.quantities[name].value == pytest.approx(longer.quantities[name].value, rel=5e-3)
     assert not any("pushes off" in one for one in short.warnings)
     assert any("surface and lands" in one for one in short.warnings)
+    rise = answer_tiles(longer)[0].value.replace("\N{NO-BREAK SPACE}", " ")  # it falls already: the apex is behind it
+    assert any(f"it rose {rise}," in one for one in longer.warnings)
+    assert any(f"it rose to {rise} above" in one for one in longer["departures"]["sentences"])
 
 
 @pytest.mark.parametrize(
