@@ -27,6 +27,7 @@ from experiments.grains.lammps import check_lammps, moved_to_lammps
 from experiments.grains.on_bed import Forecast, PlatformOnBed
 from experiments.grains.softening import Softening, run_limit
 from experiments.grains.staged import LOWERED, lower_gravity
+from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
 from experiments.runs.result import Result
 from experiments.runs.stopping import held_back
@@ -91,6 +92,13 @@ class RobotFollowed(Followed[RobotRun]):
         touch = touch_words(self.settings, robot)
         for sentence in [*plan.announcement(), *touch, *(f"warning: {warning}" for warning in falls)]:
             progress.message(sentence)
+
+    def finish(self, run: RobotRun, folder: RunFolder, progress: Progress) -> Result:
+        """As of every run; first a message where MuJoCo's steps are shorter than those of the model."""
+        used, own = run.robot.step, run.robot.control_step
+        if used < (1 - 1e-6) * own:
+            progress.message(say("shorter_step", used=1e3 * used, own=1e3 * own, macro=1e3 * run.macro_step))
+        return super().finish(run, folder, progress)
 
     def notice(self, run: RobotRun) -> str | None:
         """Once, half way: that the actuators have given no work."""

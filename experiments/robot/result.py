@@ -344,9 +344,9 @@ def _cut_off(run: RobotRun, heights: Array, flights: Flights) -> str:
     return say("airborne", speed=abs(left[1]), way=way, so_far=_quoted(_highest(run, flights.touched)), landing=landing)
 
 
-def _quoted(length: float) -> str:
-    """A length [m] in words as the table of the answer has it."""
-    return foldable(quote(length, None, "m", significant=2))
+def _quoted(value: float, unit: str = "m") -> str:
+    """A number in words as the table of the answer has it."""
+    return foldable(quote(value, None, unit, significant=2))
 
 
 def _sentences(run: RobotRun, heights: Array, flights: Flights) -> list[str]:
@@ -364,7 +364,8 @@ def _sentences(run: RobotRun, heights: Array, flights: Flights) -> list[str]:
     told.append(say("went", way=1e3 * way, rose=f"{rose} {lowest}"))
     lost = bounce_words(crater_losses(run, heights, apart=APART))
     stayed = say("still_rises" if rising(run, flights) else "stayed_in_crater" if lost else "stayed")
-    flew = say("flew", count=len(flown), apart=1e3 * APART, longest=1e3 * flights.longest) if flown else stayed
+    longest, cut = _quoted(flights.longest, "s"), say("flew_cut") if flights.at_end else ""
+    flew = say("flew", count=len(flown), apart=1e3 * APART, longest=longest, cut=cut) if flown else stayed
     told.append(" ".join([flew, *lost]))
     sinkage, time = rows["sinkage"], rows["time"]
     deepest = int(sinkage.argmax())
