@@ -89,7 +89,11 @@ def _copy_given(source: Path, folder: Path) -> None:
 def over_beds(seeds: Sequence[int], results: Sequence[Mapping[str, Any]]) -> Result:
     """The result over the beds of `seeds`: means with standard deviations, and their 95 % intervals under ``sure``."""
     first, count = results[0], len(results)
-    answers = [answer_of(result["quantities"], result["feet_reached"]) for result in results]
+    hops = [result.get("hop", True) for result in results]
+    answers = [
+        answer_of(result["quantities"], result["feet_reached"], hop=hop)
+        for result, hop in zip(results, hops, strict=True)
+    ]
     sure: Json = {}
     for name in ANSWER:
         found = interval_of([answer[name] for answer in answers])
@@ -109,6 +113,7 @@ def over_beds(seeds: Sequence[int], results: Sequence[Mapping[str, Any]]) -> Res
         tables=[_each(seeds, results, answers)],
         sure=sure,
         **({"ballistic": True} if any(set(BALLISTIC.values()) & set(one["quantities"]) for one in results) else {}),
+        hop=any(hops),
         **{name: first[name] for name in OF_ALL},
         **({"forms": forms.numbers} if forms.numbers else {}),
         **({"start_height": first["start_height"]} if "start_height" in first else {}),

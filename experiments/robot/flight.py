@@ -18,7 +18,7 @@ from .settings import RobotSettings
 
 __all__ = [
     "APART", "REST", "Flights", "at_end", "at_rest", "fall_warning", "find_flights", "launched", "pushes_off", "rising",
-    "to_landing", "touch_words",
+    "stays", "to_landing", "touch_words",
 ]  # fmt: skip
 
 APART = 5e-3  # A flight lasts at least that long [s]
@@ -48,7 +48,8 @@ def find_flights(run: RobotRun, heights: Array) -> Flights:
     """The flights of a run. ``heights``: as of `to_landing`.
 
     A robot flies while nothing touches, after the first touch, for `APART` at least, if at some time of it all feet are
-    above the undisturbed surface: a foot that loses contact in its own crater does not fly.
+    above the undisturbed surface: a foot that loses contact in its own crater does not fly. Where the end of the run
+    cuts off that time, the continued flight counts: a launch is the same whenever the run ends.
     """
     free = run.columns["touching"] == 0
     if free.all():
@@ -56,10 +57,14 @@ def find_flights(run: RobotRun, heights: Array) -> Flights:
     touched, lasting = int(np.argmin(free)), max(1, round(APART / run.macro_step))
     lowest = heights.min(axis=1)
     found = [(touched + low, touched + high) for low, high in spells(free[touched:]) if high - low >= lasting]
-    rows = tuple((low, high) for low, high in found if lowest[low:high].max() > 0.0)
+    left = at_end(run, heights) if found and found[-1][1] == len(free) else None
+    reached = [lowest[low:high].max() for low, high in found]
+    if left is not None:
+        reached[-1] = max(reached[-1], lowest[-1] + left[0])  # the feet rise as the centre of mass does
+    rows = tuple(one for one, height in zip(found, reached, strict=True) if height > 0.0)
     longest = max((end - begin for begin, end in rows), default=0) * run.macro_step
     cut = bool(rows) and rows[-1][1] == len(free)
-    return Flights(rows, touched, at_end=cut, longest=longest, left=at_end(run, heights) if cut else None)
+    return Flights(rows, touched, at_end=cut, longest=longest, left=left if cut else None)
 
 
 def launched(run: RobotRun, heights: Array, begin: int) -> list[str]:
@@ -83,9 +88,10 @@ def to_landing(run: RobotRun, heights: Array, left: tuple[float, float, float] |
     gravity, height, speed = run.robot.gravity, max(0.0, float(heights[-1].min())), float(_upwards(run)[-1])
     if run.robot.hangs or (gravity <= 0 and speed >= 0):
         return say("no_landing")
-    end = float(run.columns["time"][-1])
+    end, low = float(run.columns["time"][-1]), float(heights[-1].min())
     fall = -height / speed if left is None else left[2]
-    return say("landing", fall=fall, height=1e3 * height, wanted=_above(end + fall))
+    where = say("in_crater" if low < 0 else "above_surface", height=1e3 * abs(low))
+    return say("landing", fall=fall, where=where, wanted=_above(end + fall))
 
 
 def at_end(run: RobotRun, heights: Array) -> tuple[float, float, float] | None:
@@ -126,6 +132,15 @@ def rising(run: RobotRun, flights: Flights) -> bool:
         return False
     first = int(np.argmax(speeds > _slow(run)))
     return bool(speeds[first:].min() >= -_slow(run) or z[-1] + speeds[-1] ** 2 / (2 * gravity) > z.max() + REST)
+
+
+def stays(run: RobotRun, flights: Flights) -> bool:
+    """Whether a robot stays on the ground from its first touch to the end: its rise is then none of a hop.
+
+    After a fall onto the ground its largest height is that of the first touch. A run that ends while the robot is
+    `rising` does not say it.
+    """
+    return flights.touched is not None and not flights.rows and not rising(run, flights)
 
 
 def pushes_off(run: RobotRun, flights: Flights) -> str | None:

@@ -142,6 +142,9 @@ def expected_words(numbers: Json, best: Answer, *, on_grains: bool) -> list[str]
     told = "highest" if best["longest_flight"] > 0 else "sinkage_largest"
     unit, one = ANSWER[told], ranges[told]
     shown = in_one_unit([answer[told] for answer in answers.values()], unit, widest=(one["low"], one["high"]))
+    if told == "highest":
+        no_hop, stay = say("no_hop"), [answer["longest_flight"] == answer[told] == 0 for answer in answers.values()]
+        shown = [no_hop if stays else number for stays, number in zip(stay, shown, strict=True)]
     each = "; ".join(f"{law} {number}" for law, number in zip(answers, shown, strict=True))
     words = {"what": say(f"called_{told}"), "ends": between(one["low"], one["high"], unit), "each": each}
     near = next((law for law in (_named(DEFAULT, (DROPPED_INERTIA,)), DEFAULT) if law in answers), None)

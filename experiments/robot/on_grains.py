@@ -27,6 +27,7 @@ from experiments.grains.lammps import check_lammps, moved_to_lammps
 from experiments.grains.on_bed import Forecast, PlatformOnBed
 from experiments.grains.softening import Softening, run_limit
 from experiments.grains.staged import LOWERED, lower_gravity
+from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
 from experiments.runs.result import Result
 from experiments.runs.stopping import held_back
@@ -58,6 +59,7 @@ DEEPER = 1.3
 0.7 to 1.25 times as deep (docs/notes/mujoco.md). This law is the nearest to grains."""
 SPARE = 0.2  # Share of the way and depth of the feet that the advised bed has more than it needs
 FEWEST_ACROSS = 5.0  # Grains across the widest part of a foot, below which it is refused [1]
+POLYGON = 0.01  # Share by which a foot may be narrower than that: the outline of a ball is a polygon [1]
 
 
 class RobotFollowed(Followed[RobotRun]):
@@ -90,6 +92,13 @@ class RobotFollowed(Followed[RobotRun]):
         touch = touch_words(self.settings, robot)
         for sentence in [*plan.announcement(), *touch, *(f"warning: {warning}" for warning in falls)]:
             progress.message(sentence)
+
+    def finish(self, run: RobotRun, folder: RunFolder, progress: Progress) -> Result:
+        """As of every run; first a message where MuJoCo's steps are shorter than those of the model."""
+        used, own = run.robot.step, run.robot.control_step
+        if used < (1 - 1e-6) * own:
+            progress.message(say("shorter_step", used=1e3 * used, own=1e3 * own, macro=1e3 * run.macro_step))
+        return super().finish(run, folder, progress)
 
     def notice(self, run: RobotRun) -> str | None:
         """Once, half way: that the actuators have given no work."""
@@ -331,10 +340,10 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
         for foot in self._robot.feet:
             if not foot.shapes:
                 raise ValueError(say("site_on_grains", name=foot.name))
-            if self.widths[foot.name] < FEWEST_ACROSS * s.grain * (1 - 1e-6):  # meshes are in single precision
-                across, most = self.widths[foot.name] / s.grain, self.widths[foot.name] / FEWEST_ACROSS
-                raise ValueError(say("small_foot", s=s, name=foot.name, width=self.widths[foot.name], across=across,
-                                     fewest=FEWEST_ACROSS, most=most))  # fmt: skip
+            width = self.widths[foot.name]
+            if width < FEWEST_ACROSS * s.grain * (1 - POLYGON):
+                words = {"width": width, "across": width / s.grain, "most": width / FEWEST_ACROSS}
+                raise ValueError(say("small_foot", s=s, name=foot.name, fewest=FEWEST_ACROSS, **words))
         if self._robot.clearance < s.grain * (1 - 1e-9):
             raise ValueError(say("low_start", s=s, clearance=self._robot.clearance))
         if not self.gravity > 0:

@@ -8,7 +8,7 @@ duration. In flight MuJoCo continues it without the ground (`experiments.robot.f
 from coupling.robot import RobotRun
 
 from .feet import feet_reached, heights_of
-from .flight import REST, at_rest, find_flights, rising
+from .flight import REST, at_rest, find_flights, rising, stays
 from .forms import OnLaw
 from .result import quantities_of
 from .sure import answer_of
@@ -49,7 +49,8 @@ def on_law(run: RobotRun) -> OnLaw:
     """What a run on a law leaves for the range over the laws."""
     heights = heights_of(run)
     flights = find_flights(run, heights)
-    answer = answer_of(quantities_of(run, heights, flights), feet_reached(run, heights))
+    hop = not stays(run, flights)
+    answer = answer_of(quantities_of(run, heights, flights), feet_reached(run, heights), hop=hop)
     return OnLaw(answer=answer, time=run.time, rising=rising(run, flights))
 
 

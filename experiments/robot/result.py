@@ -19,6 +19,7 @@ from experiments.runs.types import Json
 from rigid.platform.solids import Mesh, merge
 from rigid.spatial.quaternions import to_matrix
 from vis.page.answer import LIFTED
+from vis.page.numbers import foldable, quote
 from vis.robot.answer import BALLISTIC
 
 from . import say
@@ -33,7 +34,7 @@ from .feet import (
     too_deep,
     too_fast,
 )
-from .flight import APART, Flights, at_end, find_flights, launched, pushes_off, to_landing
+from .flight import APART, Flights, at_end, find_flights, launched, pushes_off, rising, stays, to_landing
 from .forms import NO_FORMS, Forms
 from .laws import of_sand
 from .plan import RobotPlan
@@ -194,7 +195,7 @@ def conclude(
         "departures": {"sentences": sentences},
         "trial": {name: vars(number) for name, number in plan.numbers.items()},
         "surface": plan.surface.name, "ground": "bed" if settings.on_grains else plan.law,
-        "duration": settings.duration,
+        "duration": settings.duration, "hop": not stays(run, flights), "rising": rising(run, flights),
         **({"sure": sure} if sure else {}), **({"forms": forms.numbers} if forms.numbers else {}),
         "feet": [foot.name for foot in robot.feet], "feet_reached": feet_reached(run, heights),
         "start_height": float(heights[0].min()),
@@ -340,7 +341,12 @@ def _cut_off(run: RobotRun, heights: Array, flights: Flights) -> str:
     if left is None:
         return say("airborne_for_ever", landing=landing)
     way = "upwards" if left[1] >= 0 else "downwards"
-    return say("airborne", speed=abs(left[1]), way=way, so_far=1e3 * _highest(run, flights.touched), landing=landing)
+    return say("airborne", speed=abs(left[1]), way=way, so_far=_quoted(_highest(run, flights.touched)), landing=landing)
+
+
+def _quoted(value: float, unit: str = "m") -> str:
+    """A number in words as the table of the answer has it."""
+    return foldable(quote(value, None, unit, significant=2))
 
 
 def _sentences(run: RobotRun, heights: Array, flights: Flights) -> list[str]:
@@ -349,16 +355,17 @@ def _sentences(run: RobotRun, heights: Array, flights: Flights) -> list[str]:
     if touched is None:
         return [f"{say('touches_nothing')} {to_landing(run, heights, at_end(run, heights))}."]
     way = float(np.hypot(rows["x"][-1] - rows["x"][0], rows["y"][-1] - rows["y"][0]))
-    rise = 1e3 * _highest(run, touched)
+    rise = _highest(run, touched)
     lifted = float(heights[0].min())
     start = say("started_above", height=1e3 * lifted) if lifted > LIFTED else ""
-    rose = say("rose", rise=rise, start=start) if rise >= 0 else say("stayed_below", rise=-rise, start=start)
+    rose = say("rose" if rise >= 0 else "stayed_below", rise=_quoted(abs(rise)), start=start)
     told = launched(run, heights, flown[0][0]) if flown else []
-    lowest = say("rose_from_lowest", rise=1e3 * (_from_lowest(run, flights) or 0.0))
+    lowest = say("rose_from_lowest", rise=_quoted(_from_lowest(run, flights) or 0.0))
     told.append(say("went", way=1e3 * way, rose=f"{rose} {lowest}"))
     lost = bounce_words(crater_losses(run, heights, apart=APART))
-    stayed = say("stayed_in_crater" if lost else "stayed")
-    flew = say("flew", count=len(flown), apart=1e3 * APART, longest=1e3 * flights.longest) if flown else stayed
+    stayed = say("still_rises" if rising(run, flights) else "stayed_in_crater" if lost else "stayed")
+    longest, cut = _quoted(flights.longest, "s"), say("flew_cut") if flights.at_end else ""
+    flew = say("flew", count=len(flown), apart=1e3 * APART, longest=longest, cut=cut) if flown else stayed
     told.append(" ".join([flew, *lost]))
     sinkage, time = rows["sinkage"], rows["time"]
     deepest = int(sinkage.argmax())

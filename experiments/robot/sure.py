@@ -28,10 +28,18 @@ _SIGNED = ("highest",)  # May be below 0: the centre of mass stays below its sta
 Answer = Mapping[str, float]
 
 
-def answer_of(quantities: Mapping[str, Json], reached: Mapping[str, Mapping[str, float]]) -> dict[str, float]:
-    """The numbers of `ANSWER` from quantities and ``feet_reached`` of a result, ballistic ones before others."""
+def answer_of(
+    quantities: Mapping[str, Json], reached: Mapping[str, Mapping[str, float]], *, hop: bool = True
+) -> dict[str, float]:
+    """The numbers of `ANSWER` from quantities and ``feet_reached`` of a result, ballistic ones before others.
+
+    ``hop``: False where the robot stays on the ground (`experiments.robot.flight.stays`). Its rise is then 0, and so is
+    the clearance of a single foot: a robot of several feet may lift one while it stands on others.
+    """
     values = {name: one["value"] for name, one in quantities.items()}
     values["clearance_largest"] = max(foot["clearance_largest"] for foot in reached.values())
+    if not hop:
+        values |= {"highest": 0.0} | ({"clearance_largest": 0.0} if len(reached) == 1 else {})
     return {name: float(values.get(BALLISTIC.get(name, name), values[name])) for name in ANSWER}
 
 

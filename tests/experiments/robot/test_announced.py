@@ -15,6 +15,8 @@ pytest.importorskip("mujoco", reason="mujoco is not installed: pip install 'hedg
 
 PLATE = """<mujoco><worldbody><body pos="0 0 0.2"><freejoint/>
 <geom name="foot" type="cylinder" size="0.03 0.01" mass="1.5"/></body></worldbody></mujoco>"""
+BALL = """<mujoco><worldbody><body pos="0 0 0.02"><joint type="slide" axis="0 0 1"/>
+  <geom name="foot" size="0.02" mass="0.3" euler="0 37 0"/></body></worldbody></mujoco>"""
 HOPPER = {"model": "hopper", "feet": ("foot",), "surface": "sand"}
 ON_BED = HOPPER | {"ground": "bed", "height": 0.012, "grain": 0.012, "duration": 0.05}
 
@@ -35,6 +37,20 @@ def test_one_refusal_names_all_sides_of_a_bed_and_a_bed_of_that_size_gives_no_fu
     wide.check_extent()
     assert not [said for said in wide.told.warnings if "narrower than" in said]
     assert [said for said in on_bed(bed_size=(0.2, *size[1:])).told.warnings if "narrower than" in said]
+
+
+def test_a_ball_of_five_grains_is_accepted_though_its_outline_is_a_polygon_and_so_is_the_grain_that_a_refusal_names(
+    tmp_path,
+):
+    """40 mm over 8 mm are 5; the outline of the ball is 39.9 mm wide."""
+    (tmp_path / "ball.xml").write_text(BALL, encoding="utf-8")
+    given = {"model": str(tmp_path / "ball.xml"), "bed_size": (0.16, 0.16, 0.14)}
+    on_bed(**given, grain=0.008).check()
+    with pytest.raises(ValueError, match="foot 'foot' is") as refused:
+        on_bed(**given, grain=0.0085).check()
+    (named,) = re.findall(r"at most ([0-9.]+) m", str(refused.value))
+    assert 0.0079 < float(named) <= 0.0081
+    on_bed(**given, grain=float(named)).check()
 
 
 def test_a_robot_that_starts_above_the_surface_is_told_when_it_touches_and_it_does_so(tmp_path):

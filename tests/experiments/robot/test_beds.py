@@ -83,7 +83,7 @@ def law_in_place_of_grains(computed):
         folder.write_result(Result.make(
             "mujoco", title="a robot on a bed of sand", quantities=numbers, code="of grains",
             departures={"sentences": ["said of all"]}, trial={}, surface="sand", ground="bed", duration=0.12,
-            feet=["foot"], feet_reached={"foot": {"clearance_largest": float(heights.max())}},
+            hop=seed != 2, feet=["foot"], feet_reached={"foot": {"clearance_largest": float(heights.max())}},
             warnings=["on all", f"on {seed}"], grains={"seed": seed, "beside": numbers, "beside_law": "rft"},
         ))  # fmt: skip
 
@@ -113,6 +113,8 @@ def test_several_beds_have_means_with_students_interval_and_a_stopped_run_comput
         assert result.quantities[name].value == pytest.approx(np.mean(values)) and np.ptp(values) > 0
         assert result.quantities[name].std == pytest.approx(np.std(values, ddof=1))
         assert result["sure"][name]["high"] == pytest.approx(np.mean(values) + half)
+    no_rise = [bed["answer"]["highest"] == bed["answer"]["clearance_largest"] == 0.0 for bed in result["beds"]]
+    assert no_rise == [False, True, False] and result["hop"]  # of the second bed, on which the robot stays
     largest = max(one["quantities"]["energy_residual"]["value"] for one in of_beds)
     assert result.quantities["energy_residual"].value == largest
     assert result.warnings == ["on all", *(f"seed {k}: on {k}" for k in (1, 2, 3))]

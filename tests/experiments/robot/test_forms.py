@@ -107,6 +107,18 @@ def test_a_robot_that_leaves_no_law_has_no_later_landing():
     assert not any("--duration" in words for words in forms_of(planned(), own, lambda _: own, sure={}).words)
 
 
+def test_laws_on_which_the_robot_does_not_hop_count_as_no_rise():
+    plan, stays = planned(), dict.fromkeys(ANSWER, 0.03) | {"highest": 0.0, "longest_flight": 0.0}
+
+    def follow(other):
+        return OnLaw(answer=stays, time=0.12) if other.law == OF_1_G else on_law(0.06)
+
+    forms = forms_of(plan, on_law(0.05), follow, sure={})
+    rise = forms.numbers["ranges"]["highest"]
+    assert f"{OF_1_G} no hop" in forms.words[0] and (rise["low"], rise["high"]) == (0.0, 0.06)
+    assert "no hop" not in with_grains(forms, stays).words[0]  # there the sinkage is compared
+
+
 def test_laws_on_which_a_foot_sinks_deeper_than_the_bed_are_named():
     plan = planned()
     answers = {law: on_law(0.01 * place) for place, law in enumerate(other_laws(plan), 1)}

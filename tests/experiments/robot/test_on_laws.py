@@ -13,6 +13,7 @@ from experiments.robot.on_laws import answer_of_run, follow_on, on_law
 from experiments.robot.plan import plan_robot
 from experiments.robot.result import conclude
 from experiments.robot.settings import RobotSettings
+from vis.robot.answer import answer_tiles
 
 pytest.importorskip("mujoco", reason="mujoco is not installed: pip install 'hedgebed[mujoco]'")
 
@@ -97,6 +98,57 @@ def on_bed():
     settings = RobotSettings(**HOPPER, ground="bed", grain=0.012, bed_size=(0.24, 0.24, 0.2), duration=0.3)
     plan = plan_robot(settings)
     return RobotOnBed(settings, plan), plan
+
+
+def test_a_run_that_ends_in_the_crater_of_its_launch_flies_as_a_longer_one_does(tmp_path):
+    """The leg loses contact 47 mm deep. The run ends 6 ms before the foot is at the surface, with the push over."""
+
+    def followed(duration):
+        plan = plan_robot(RobotSettings(**HOPPER, gravity=1.0, duration=duration))
+        run = run_of(plan)
+        run.run()
+        return run, conclude(plan.settings, plan, run, tmp_path)
+
+    whole, longer = followed(1.1)
+    heights = heights_of(whole)[:, 0]
+    (begin, _), *_ = find_flights(whole, heights_of(whole)).rows
+    out = begin + int(np.argmax(heights[begin:] > 0))
+    cut, short = followed(float(whole.columns["time"][out - 15]))
+    assert heights_of(cut)[-1, 0] < -2e-3 and find_flights(cut, heights_of(cut)).at_end and not on_law(cut).rising
+    launches = [
+        [said for said in one["departures"]["sentences"] if "first flight begins" in said] for one in (short, longer)
+    ]
+    assert launches[0] == launches[1] != []
+    for name in ("rise_ballistic", "flight_ballistic"):
+        assert short.quantities[name].value == pytest.approx(longer.quantities[name].value, rel=5e-3)
+    assert not any("pushes off" in one for one in short.warnings)
+    assert any("surface and lands" in one for one in short.warnings)
+    rise = answer_tiles(longer)[0].value.replace("\N{NO-BREAK SPACE}", " ")  # it falls already: the apex is behind it
+    assert any(f"it rose {rise}," in one for one in longer.warnings)
+    assert any(f"it rose to {rise} above" in one for one in longer["departures"]["sentences"])
+
+
+@pytest.mark.parametrize(
+    ("given", "hop", "up"),
+    [
+        ({"surface": "sand", "height": 0.02, "duration": 0.2}, False, False),
+        (BRICK | {"duration": 0.085}, True, True),
+        (BRICK | {"duration": 0.2}, True, False),
+    ],
+)
+def test_a_robot_that_stays_on_the_ground_has_no_rise_in_a_range_and_its_result_states_it(
+    planned, tmp_path, given, hop, up
+):
+    """On sand the plate falls by 20 mm and stays: the largest height after its first touch is that of the touch."""
+    plan = planned(**given)
+    run = run_of(plan)
+    run.run()
+    result, answer = conclude(plan.settings, plan, run, tmp_path), answer_of_run(run)
+    assert (result["hop"], result["rising"]) == (hop, up)
+    assert (answer["highest"] == answer["clearance_largest"] == 0.0) == (not hop)
+    assert result.quantities["highest"].value == pytest.approx(-0.02, abs=1e-3) or hop
+    told = " ".join(result["departures"]["sentences"])
+    assert ("before the end" in told) == up
 
 
 def test_the_law_beside_a_bed_goes_on_to_its_flight():

@@ -2,6 +2,7 @@
 
 import pytest
 
+from experiments.cli.main import main
 from experiments.grains.staged import LOWERED
 from experiments.robot.forms import MOST_INERTIA
 from experiments.robot.on_grains import DEEPER, RobotFollowed, RobotOnBed, report_seconds
@@ -99,3 +100,16 @@ def test_the_work_and_the_plan_have_the_rest_in_a_lowered_gravity_and_the_pictur
     bare = on_bed(frame_count=0)
     assert "without pictures" in bare._work()
     assert report_seconds(bare.settings) < report_seconds(lowered.settings)
+
+
+@pytest.mark.parametrize(("step", "told"), [(5e-4, True), (1e-4, False)])
+def test_steps_of_mujoco_that_are_shorter_than_those_of_the_model_are_stated_in_a_line(tmp_path, capsys, step, told):
+    (tmp_path / "ball.xml").write_text(
+        f"""<mujoco><option timestep="{step}"/><worldbody><body pos="0 0 0.03"><joint type="slide" axis="0 0 1"/>
+        <geom name="foot" size="0.03" mass="1"/></body></worldbody></mujoco>""",
+        encoding="utf-8",
+    )
+    given = ["--feet", "foot", "--duration", "0.004", "--frame-count", "0", "--out", str(tmp_path / "run")]
+    assert main(["mujoco", str(tmp_path / "ball.xml"), *given]) == 0
+    lines = [line for line in capsys.readouterr().err.splitlines() if "shorter than the" in line]
+    assert len(lines) == told and all("0.4 ms" in line and "0.5 ms" in line for line in lines)
