@@ -336,3 +336,20 @@ def test_a_comparison_has_both_numbers_their_spreads_and_the_difference():
         ["–"],
         ["+0.1", "m/s", "(+100", "%)"],
     ]
+
+
+@pytest.mark.parametrize(("feet", "third"), [(1, "Longest flight"), (2, "Clearance")])
+def test_a_robot_that_stays_on_the_ground_has_no_rise_but_that_from_its_lowest_point(feet, third):
+    reached = {f"foot{k}": {"clearance_largest": 0.004} for k in range(feet)}
+    result = robot_result(ground="rft", hop=False, start_height=0.008, feet_reached=reached)
+    result["quantities"]["highest"]["value"] = -0.0076
+    result["quantities"]["rise_from_lowest"] = {"value": 0.099, "std": None, "unit": "m"}
+    tiles = answer_tiles(result)
+    assert [tile.label.partition(" from")[0] for tile in tiles[:3]] == ["Rise", "Rise", third]
+    assert tiles[0].value == "none" and tiles[1].value.startswith("99")
+    assert not any("start" in block.text for block in answer(tiles, result) if block.text)
+
+
+def test_a_rise_that_ends_on_the_way_up_is_labelled():
+    labels = [tile.label for tile in answer_tiles(robot_result(ground="rft", rising=True))]
+    assert labels[0] == "Rise, so far" and "Sinkage" in labels

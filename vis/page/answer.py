@@ -132,11 +132,12 @@ def _errors(result: Mapping[str, Any], on_grains: bool) -> tuple[Sequence[str], 
 
 def _errors_of_robot(result: Mapping[str, Any], on_grains: bool) -> tuple[Sequence[str], list[str]]:
     """The same of a robot of MuJoCo."""
-    forms, rise = "forms" in result, [result["quantities"].get("highest", {}).get("value")]
+    forms, hop = "forms" in result, result.get("hop", True)
+    rise = [result["quantities"].get("highest", {}).get("value")] if hop else []
     rise += [one["low"] for one in [(result.get("forms") or {}).get("ranges", {}).get("highest")] if one]
     told = {
         "one_bed": on_grains and "beds" not in result, "laws_of_sand": forms and not on_grains,
-        "laws_and_grains": forms and on_grains, "start_of_rise": (result.get("start_height") or 0.0) > LIFTED,
+        "laws_and_grains": forms and on_grains, "start_of_rise": hop and (result.get("start_height") or 0.0) > LIFTED,
         "below_start": any((one or 0.0) < 0 for one in rise), "no_error": True,
     }  # fmt: skip
     chance = say("of_95") if "beds" in result else _ERRORS[0]

@@ -154,7 +154,9 @@ def between(low: float, high: float, unit: str) -> str:
     top = quote(high, None, unit, significant=2)
     scale = _scale(float(f"{high:.1e}"), unit)[0]
     bottom = f"{float(f'{low / scale:.2g}'):g}".replace("-", _MINUS) if low else "0"
-    return f"{bottom} to {top}"
+    number = top.split(_SPACE)[0]
+    same = low and float(bottom.replace(_MINUS, "-")) == float(number.replace(_MINUS, "-"))
+    return f"{number if same else bottom} to {top}"
 
 
 def in_one_unit(values: Sequence[float], unit: str, *, widest: Sequence[float]) -> list[str]:

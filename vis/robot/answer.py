@@ -22,6 +22,9 @@ BALLISTIC = {
     "highest": "rise_ballistic", "longest_flight": "flight_ballistic", "clearance_largest": "clearance_ballistic",
 }  # fmt: skip
 """Number of the answer -> the quantity in its place where the end of the run cuts off a flight."""
+FROM_LOWEST = ("Rise from its lowest point", "of the centre of mass, after the first touch")
+NO_HOP, STAYED = "none", "it did not leave the ground"
+SO_FAR = "up to the end of the run, where it is on its way up"
 OF_FLIGHT = "ballistic: the flight at the end of the run, continued without the ground"
 UNKNOWN, ONE_BED = "not known", "one bed"
 
@@ -42,10 +45,13 @@ def answer_tiles(result: Mapping[str, Any]) -> list[Tile]:
     if "clearance_largest" not in quantities and reached:  # of several feet each has its own
         highest = max(foot["clearance_largest"] for foot in reached)
         found["clearance_largest"] = {"value": highest, "std": None, "unit": "m"}
+    hop, rising = result.get("hop", True), result.get("rising", False)  # an older hedgebed has neither
     rows = []
-    for name, (label, note) in LABELS.items():
+    for name, (label, note) in _labels(hop=hop, several=len(reached) > 1).items():
         if name not in found:  # a folder of an older hedgebed
             continue
+        if rising and name in BALLISTIC:
+            label, note = f"{label}, so far", SO_FAR
         if ballistic and name in BALLISTIC:
             label, note = f"{label}, ballistic", OF_FLIGHT
         value, one = quantity(found.get(BALLISTIC.get(name, name), found[name])), sure.get(name)
@@ -57,6 +63,20 @@ def answer_tiles(result: Mapping[str, Any]) -> list[Tile]:
             chance = "" if "±" in value else "0"  # `vis.page.answer` takes it from the value
         elif one is not None:
             chance = between(one["low"], one["high"], one["unit"])
+        if name == "highest" and not hop:
+            value, note, chance = NO_HOP, STAYED, chance or ("0" if several else "")
         rows.append(Tile(label, value, note, errors=(chance, UNKNOWN if on_grains else "", third)))
     note = "largest of all beds, of all there was" if several else "of all there was"
     return [*rows, Tile("Energy error", quantity(quantities["energy_residual"]), note)]
+
+
+def _labels(*, hop: bool, several: bool) -> dict[str, tuple[str, str]]:
+    """`LABELS`; without a hop the rise from the lowest point is in place of the clearance of a single foot.
+
+    A robot of several feet may lift one while it stands on others: there it is in place of the flight.
+    """
+    if hop:
+        return LABELS
+    left_out = "longest_flight" if several else "clearance_largest"
+    found = {name: words for name, words in LABELS.items() if name != left_out}
+    return {"highest": found.pop("highest"), "rise_from_lowest": FROM_LOWEST, **found}

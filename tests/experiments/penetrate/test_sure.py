@@ -148,7 +148,12 @@ def test_terminal_and_report_state_the_sinkage_among_real_grains(tmp_path):
 
 @pytest.mark.parametrize(
     ("ends", "words"),
-    [((0.0, 0.0073), "0|7.3 mm"), ((0.64, 26.6), "0.64|27 m"), ((-0.002, 0.001), "−2|1.0 mm")],
+    [
+        ((0.0, 0.0073), "0|7.3 mm"),
+        ((0.64, 26.6), "0.64|27 m"),
+        ((-0.002, 0.001), "−2|1.0 mm"),
+        ((-0.004, -0.0039999), "−4.0|−4.0 mm"),
+    ],
 )
 def test_two_ends_have_one_unit(ends, words):
     assert in_words(*ends, "m").split(" to ") == words.split("|")

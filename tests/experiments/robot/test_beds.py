@@ -273,4 +273,4 @@ def test_a_bed_whose_sides_moved_is_said_to_be_too_narrow(way, said):
     bed = SimpleNamespace(size=(0.2, 0.2, 0.25), surface=0.2, grains=lambda contacts: grains)
     warning = sides_warning(bed)
     assert (warning is not None) == said
-    assert not said or ("1.5 diameters" in warning and "0.3 by 0.3 m" in warning)
+    assert not said or ("1.5 diameters" in warning and "0.3 by 0.3" in warning)
