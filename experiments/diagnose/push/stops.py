@@ -21,7 +21,7 @@ __all__ = ["AtStops", "at_stops", "doubts_of_damping"]
 _MOVES, _STANDS = 0.8, 0.1  # share of a push's pace from which on it moves, and up to which it stands
 _PACE = 90.0  # percentile of the speed that is the pace of a push
 _ROWS, _FEWEST, _LONGEST = 20, 5, 40  # rows on either side of a stop at most and at least; rows that a stop lasts
-_SURE, _FAR = 3.0, 0.25  # standard errors, and share of the larger C, from which on the two differ
+_SURE, _FAR = 0.997, 0.25  # two-sided probability, and share of the larger C, from which on the two differ
 
 
 @dataclass(frozen=True)
@@ -62,8 +62,7 @@ def _doubt(pushes: Sequence[Push], damping: float) -> list[str]:
     if found is None:
         return []
     apart, larger = abs(found.damping - damping), max(abs(found.damping), abs(damping))
-    sure = max(_SURE, student(found.count - 1, 2 * 0.997 - 1))
-    if apart <= sure * found.std or apart <= _FAR * larger:
+    if apart <= student(found.count - 1, _SURE) * found.std or apart <= _FAR * larger:
         return []
     half = found.std * student(found.count - 1, 0.95)
     quoted = f"{numeral(found.damping, 3)} ± {numeral(half, 2)} N s/m"
