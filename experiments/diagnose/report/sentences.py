@@ -83,18 +83,15 @@ def sure_sentences(diagnosis: Row) -> list[str]:
 
 def _how_often(diagnosis: Row) -> list[str]:
     """How often a named verdict was right in the independent count of such campaigns, and what nats are."""
-    counted = diagnosis.get("counted")
-    if diagnosis["verdict"] != "named" or counted is None:
+    if diagnosis["verdict"] != "named" or (counted := diagnosis.get("counted")) is None:
         return []
-    of, soft = say(f"of_{counted['of']}"), counted.get("mujoco")
-    if len(diagnosis["effects"]) > 1:
-        pairs = counted.get("pairs")
-        too = "" if soft is None else say("of_mujoco", counted=soft["pairs"])
-        more = say("more_names") if len(diagnosis["effects"]) > 2 else ""
-        told = {"of": of, "pairs": pairs, "too": too, "more": more}
-        return [] if pairs is None else [say("how_often_pairs", **told, least=_least(pairs))]
-    too = "" if soft is None else say("of_mujoco", counted=soft)
-    return [say("how_often", of=of, counted=counted, least=_least(counted), too=too)]
+    count, soft = len(diagnosis["effects"]), counted.get("mujoco", {})
+    key, row, other = ("how_often", counted, soft) if count == 1 else (
+        "how_often_pairs", counted.get("pairs"), soft.get("pairs"))  # fmt: skip
+    if row is None:
+        return []
+    too, more = say("of_mujoco", counted=other) if other else "", say("more_names") if count > 2 else ""
+    return [say(key, of=say(f"of_{counted['of']}"), counted=row, pairs=row, too=too, more=more, least=_least(row))]
 
 
 def _must_gain(own: Row) -> str:
@@ -105,8 +102,7 @@ def _must_gain(own: Row) -> str:
 
 def _least(counted: Row) -> float:
     """The lower bound of a rate [%] of which `right` of `named` were counted."""
-    right, named = counted["right"], counted["named"]
-    return 100 * float(beta.ppf(1 - _BOUND, right, named - right + 1))
+    return 100 * float(beta.ppf(1 - _BOUND, counted["right"], counted["named"] - counted["right"] + 1))
 
 
 _SPREAD_UNITS = {
