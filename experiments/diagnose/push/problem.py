@@ -433,7 +433,9 @@ class PenetrationProblem(Problem):
         }
 
     def remarks(self, values: Values, forms: Sequence[Form]) -> list[str]:
-        """See `Problem`: of C, by the stops of the drive."""
+        """See `Problem`: of C, by the stops of the drive. Friction of a shaft at rest is not known: then none."""
+        if any(form.effect == "shaft-friction" for form in forms):
+            return []
         dampings = {diameter: self._number(values, "damping", diameter) for diameter in self._diameters}
         return doubts_of_damping(self._pushes(values, forms, list(self.prepared)), dampings)
 

@@ -21,6 +21,7 @@ __all__ = ["AtStops", "at_stops", "doubts_of_damping"]
 _MOVES, _STANDS = 0.8, 0.1  # share of a push's pace from which on it moves, and up to which it stands
 _PACE = 90.0  # percentile of the speed that is the pace of a push
 _ROWS, _FEWEST, _LONGEST = 20, 5, 40  # rows on either side of a stop at most and at least; rows that a stop lasts
+_FURTHER = 0.5  # way from the last moving row to rest, over the way that a line is fitted to, at most
 _SURE, _FAR = 0.997, 0.25  # two-sided probability, and share of the larger C, from which on the two differ
 
 
@@ -59,7 +60,7 @@ def doubts_of_damping(pushes: Sequence[Push], dampings: Mapping[float, float]) -
 
 def _doubt(pushes: Sequence[Push], damping: float) -> list[str]:
     found = at_stops(pushes)
-    if found is None:
+    if found is None or found.damping < 0:  # the force rises at a stop: no damper does this
         return []
     apart, larger = abs(found.damping - damping), max(abs(found.damping), abs(damping))
     if apart <= student(found.count - 1, _SURE) * found.std or apart <= _FAR * larger:
@@ -98,6 +99,8 @@ def _step(push: Push) -> tuple[float, float] | None:
     rest = push.force - push.spring
     # A line over the depth, to where the tip stands: an error of the fitted spring is not taken for a damper.
     way = push.depth[in_motion] - push.depth[at_rest].mean()
+    if abs(way[-1]) > _FURTHER * np.ptp(way):  # eased into its rest: the line would reach too far
+        return None
     columns = np.column_stack([np.ones_like(way), way])
     inverse = np.linalg.pinv(columns)
     fall = float(inverse[0] @ rest[in_motion] - rest[at_rest].mean())

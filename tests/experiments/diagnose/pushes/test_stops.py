@@ -1,5 +1,7 @@
 """C by the step of the force where a drive stops, beside the C of a fitted model."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -41,6 +43,12 @@ def test_a_model_with_another_c_is_doubted_and_one_with_that_c_is_not():
 def test_pushes_without_a_hold_say_nothing_of_c():
     assert at_stops(pushes(12.0, hold=0.004)) is None
     assert doubts_of_damping(pushes(12.0, hold=0.0), {DIAMETER: 1.0}) == []
+
+
+def test_a_force_that_rises_at_a_stop_or_a_tip_that_eases_into_its_rest_says_nothing():
+    assert doubts_of_damping(pushes(-12.0), {DIAMETER: 4.0}) == []
+    eased = [replace(push, depth=np.where(push.speed > 0, push.depth, push.depth + 0.01)) for push in pushes(12.0)]
+    assert at_stops(eased) is None
 
 
 def test_a_single_stop_is_no_evidence():
