@@ -198,7 +198,7 @@ class Diagnosis(Known):
         """The same of the best model."""
         return bounds_met(self.best)
 
-    @property
+    @cached_property
     def remarks(self) -> tuple[str, ...]:
         """Which of the best model's numbers are implausible, a sentence each."""
         return tuple(self.problem.remarks(self.best.values, self.forms))
@@ -259,7 +259,7 @@ class Diagnosis(Known):
         rivals = self.choice.rivals if self.choice is not None and self.verdict == "named" else ()
         return min(rivals, key=lambda rival: rival.lead, default=None)
 
-    @property
+    @cached_property
     def facts(self) -> tuple[str, ...]:
         """What the trials that took part show of the base model's numbers, a sentence each."""
         trials = (*self.fitted, *self.held_out)
