@@ -2,9 +2,10 @@
 
     python docs/results/diagnose-mujoco/control.py 2027015:base:1 2027015:mujoco:0.95 >> control.jsonl
 
-An argument is the seed of a campaign in tumble-2027, what moves it (`mujoco`, or `base`: benchmarks/second without its
+An argument is the seed of a counted campaign, what moves it (`mujoco`, or `base`: benchmarks/second without its
 structure) and a factor on the stated mu_d. Plan, sensors and hidden numbers are the campaign's own; noise is another.
-`left_by_truth`: of an empty campaign, what the true numbers leave a sample in each trial.
+`left_by_truth`: of a campaign with nothing hidden, or a camera's scale, what the true numbers leave a sample in each
+trial.
 """
 
 import json
@@ -23,7 +24,7 @@ from experiments.campaign import write_campaign
 from experiments.diagnose.experiment import diagnose_campaign
 from experiments.diagnose.tumble.problem import make_problem
 
-CASES = Path(__file__).parent / "tumble-2027" / "cases.jsonl"
+CASES = sorted(Path(__file__).parent.glob("tumble-*/cases.jsonl"))
 BY_MUJOCO = tumble.move
 
 
@@ -56,17 +57,21 @@ def again(case, mover, share):
         "after": {"fit": found.after.fit, "held_out": found.after.held_out},
         "mu_s": fitted["mu_s"]["value"], "mu_d": fitted["mu_d"]["value"], "mu_true": plan.true["mu_s"],
     }  # fmt: skip
-    if told["kind"] == "null":
+    if told["kind"] in ("null", "camera-scale"):
         ids = [trial["id"] for trial in made.tables["trial"]]
         gravity = {f"gravity_sim[{id}]": trial["gravity_sim"] * float(factor)
                    for id, trial, factor in zip(ids, plan.trials, plan.gravity_factor, strict=True)}  # fmt: skip
-        left = make_problem(campaign_of(made)).evaluate([dict(plan.true) | gravity], [], ids)[0]
+        problem = make_problem(campaign_of(made))
+        forms = [form for form in problem.forms if form.id == "camera-scale:same in x and y"][: len(case["truth"])]
+        scale = {"camera-scale.scale_change": case["hidden"]["settings"]["scale"]} if forms else {}
+        left = problem.evaluate([dict(plan.true) | gravity | scale], forms, ids)[0]
         row["left_by_truth"] = [float(np.mean(rows**2)) for rows in left.values()]
     return row
 
 
 if __name__ == "__main__":
-    cases = {case["case"]["seed"]: case for case in map(json.loads, CASES.read_text(encoding="utf-8").splitlines())}
+    lines = [line for path in CASES for line in path.read_text(encoding="utf-8").splitlines()]
+    cases = {case["case"]["seed"]: case for case in map(json.loads, lines)}
     for argument in sys.argv[1:]:
         seed, mover, share = argument.split(":")
         print(json.dumps(again(cases[int(seed)], mover, float(share))), flush=True)
