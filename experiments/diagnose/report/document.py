@@ -65,7 +65,7 @@ def document(found: Diagnosis, near: Sequence[Near] | None = None) -> dict[str, 
         stages = {"before": weighed.before, "after": weighed.after, "after_std": weighed.after_std}
         diagnosis["gap_with_scatter"] = {
             stage: {"fit": fitted, "held_out": held_out} for stage, (fitted, held_out) in stages.items()
-        } | {"freedom": weighed.freedom}
+        } | {"freedom": weighed.freedom, "trials": {"fit": len(found.fitted), "held_out": len(found.held_out)}}
     if rule := found.allowed_by:
         diagnosis["allowed_by"] = rule
         if rule == "form" and found.choice is not None:

@@ -9,7 +9,8 @@ from experiments.diagnose.fit.evidence import SMALL
 from experiments.diagnose.fit.gaps import numeral, size_words
 from experiments.diagnose.noise.spectrum import line_sentence
 from vis.diagnose.held_out import worsens_held_out
-from vis.page.numbers import foldable, quote
+from vis.diagnose.usable import gap_in_scatter
+from vis.page.numbers import fitted, foldable
 
 from .sentences import (
     behind_words,
@@ -123,9 +124,9 @@ def _stated_far(diagnosis: Mapping[str, Any]) -> list[str]:
 
 
 def _far_words(bound: Mapping[str, Any]) -> str:
-    """stiffness = 2275 N/m is +15.3 sigma from the stated 900 ± 90"""
+    """stiffness = 2275 N/m is +15.3 sigma from the stated 900 (sigma 90)"""
     unit = "" if bound["unit"] == "1" else f" {bound['unit']}"
-    stated = f"{bound['stated']:.4g} ± {bound['stated_std']:.2g}" if bound.get("stated_std") else "value"
+    stated = f"{bound['stated']:.4g} (sigma {bound['stated_std']:.2g})" if bound.get("stated_std") else "value"
     return f"{bound['parameter']} = {bound['value']:.4g}{unit} is {bound['sigmas']:+.1f} sigma from the stated {stated}"
 
 
@@ -199,8 +200,8 @@ def scatter_sentence(diagnosis: Mapping[str, Any]) -> list[str]:
     s = "" if freedom == 1 else "s"
     return [say(
         "weighed_none" if diagnosis["verdict"] == "none" else "weighed_both",
-        scatter=f" ({' and '.join(kinds)}{apart})" if kinds else "", before=_both(weighed["before"], {}),
-        after=_both(weighed["after"], weighed.get("after_std", {})),
+        scatter=f" ({' and '.join(kinds)}{apart})" if kinds else "", before=_both(diagnosis, "before"),
+        after=_both(diagnosis, "after"),
         rests_on=f"; the scatter has {freedom} degree{s} of freedom" if freedom else "",
     )]  # fmt: skip
 
@@ -210,14 +211,14 @@ def _no_replicates(diagnosis: Mapping[str, Any]) -> list[str]:
     return [] if diagnosis.get("has_replicates", True) else [say(f"no_replicates_{diagnosis['kind']}")]
 
 
-def _both(gap: Mapping[str, float | None], errors: Mapping[str, float | None]) -> str:
-    """A gap, fitted and held out, with its standard errors."""
+def _both(diagnosis: Mapping[str, Any], stage: str) -> str:
+    """The gap with the scatter of replicates, fitted and held out, with halves of 95 % intervals."""
 
-    def written(key: str) -> str:
-        error = errors.get(key)
-        return numeral(gap[key] or 0.0) if error is None else foldable(quote(gap[key], error))
+    def written(part: str) -> str:
+        gap = gap_in_scatter(diagnosis, part, stage)
+        return numeral(gap["value"] or 0.0) if gap["std"] is None else foldable(fitted(gap))
 
-    out = "" if gap["held_out"] is None else f" ({written('held_out')} held out)"
+    out = "" if diagnosis["gap_with_scatter"][stage]["held_out"] is None else f" ({written('held_out')} held out)"
     return f"{written('fit')} fitted{out}"
 
 

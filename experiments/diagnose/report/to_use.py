@@ -1,4 +1,4 @@
-"""Which K and C of pushes and drops to use, in which law, and what their standard errors leave out."""
+"""Which K and C of pushes and drops to use, in which law, and what their errors leave out."""
 
 import math
 from collections.abc import Mapping
@@ -6,8 +6,9 @@ from typing import Any
 
 from experiments.campaign.model_errors import bias_words
 from experiments.diagnose.fit.gaps import numeral
+from rigid.intervals import half_of
 from vis.diagnose.usable import has_numbers_to_use, secant_depth, stiffness_words
-from vis.page.numbers import foldable, quote
+from vis.page.numbers import fitted, foldable
 
 from .sentences import say
 
@@ -16,7 +17,6 @@ __all__ = ["SERIES", "law_sentences", "near_model_sentences", "number_words", "p
 
 SERIES = {"count": 77, "middle": 0.3, "most": 3.3}
 """By how much K of campaigns without an effect was below the ground's [%]: docs/results/diagnose-second, pushes."""
-_NEUTRAL = 2.0  # standard errors within which a number is not distinguished from 0
 _STRONG, _PAIRS = 0.9, 3  # correlation from which on it is reported, and of how many pairs
 _SHOWN = 4  # diameters whose K is in the sentence; of more it is in the table
 
@@ -71,9 +71,9 @@ def _words(name: str, entry: Mapping[str, Any]) -> str:
 
 
 def number_words(entry: Mapping[str, Any]) -> str:
-    """A fitted number with its standard error, both to the same digit, and its unit: 820 ± 120 N/m."""
-    known = entry["std"] is not None and entry.get("determined", True)
-    return foldable(quote(entry["value"], entry["std"] if known else None, entry["unit"], significant=4))
+    """A fitted number with half of its 95 % interval, both to the same digit, and its unit: 820 ± 120 N/m."""
+    known = dict(entry) if entry.get("determined", True) else {**entry, "std": None}
+    return foldable(fitted(known, significant=4))
 
 
 def law_sentences(diagnosis: Mapping[str, Any]) -> list[str]:
@@ -92,7 +92,7 @@ def law_sentences(diagnosis: Mapping[str, Any]) -> list[str]:
     weak = [
         f"{name} = {number_words(entry)}"
         for own in numbers.values() for name, entry in own.items()
-        if entry["std"] and entry.get("determined", True) and abs(entry["value"]) < _NEUTRAL * entry["std"]
+        if entry["std"] and entry.get("determined", True) and abs(entry["value"]) < (half_of(entry) or 0.0)
     ]  # fmt: skip
     said = [say("law", parts="; ".join(parts), reference=reference)]
     said += unloading_sentences(diagnosis)
