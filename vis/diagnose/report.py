@@ -141,7 +141,7 @@ def _gap_table(diagnosis: Result) -> Block:
         cells = [name]
         for one in (gap, weighed) if weighed is not None else (gap,):
             cells += [_DASH if one[stage][part] is None else _number(one[stage][part]) for stage in ("before", "after")]
-            if one is weighed and one["after"][part] is not None:
+            if weighed is not None and one is weighed and one["after"][part] is not None:
                 cells[-1] = fitted(gap_in_scatter(diagnosis, part))
         rows.append(cells)
     head: tuple[str, ...] = ("", "base model", "best model")
@@ -272,10 +272,20 @@ def _evidence(diagnosis: Result) -> list[Block]:
                 "of the gap closed", "forms tried", "what became of it")  # fmt: skip
         title = "One line for each set of names, in its best form; the most likely first"
         blocks.append(table(head, better, title=title, words=True))
+        blocks += _forms(diagnosis, [row[0] for row in better])
     if worse:
         blocks.append(text(say("worse", names=", ".join(worse))))
     blocks.append(text(say("searched"), small=True))
     return blocks
+
+
+def _forms(diagnosis: Result, candidates: Sequence[str]) -> list[Block]:
+    """What the forms of these candidates are."""
+    meanings = diagnosis.get("forms", {})
+    shown = [
+        id for id in meanings if any(id.partition(":")[2] in one and id.partition(":")[0] in one for one in candidates)
+    ]
+    return [text(say("forms"), small=True), listing([f"{id}: {meanings[id]}" for id in shown])] if shown else []
 
 
 def _sizes(diagnosis: Result) -> list[Block]:
