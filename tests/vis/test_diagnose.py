@@ -83,9 +83,9 @@ def test_what_replicates_differ_by_stands_beside_the_gap_and_behind_what_is_left
     write_folder(tmp_path, trials={"a": 3.0, "d": 2.0}, scatter=0.2)
     page = write_diagnosis_report(tmp_path).read_text(encoding="utf-8")
     for part in (
-        "after, held-out trials, with the scatter",
+        "Gap with scatter after, held-out trials",
         "<td>1.5",
-        "replicates&#39; scatter added",
+        "best model, gap with scatter",
         "Certain: nothing.",
     ):
         assert part in page or part.replace("&#39;", "'") in page

@@ -147,7 +147,7 @@ def _gap_table(diagnosis: Result) -> Block:
     head: tuple[str, ...] = ("", "base model", "best model")
     title = "The gap, chi-square per sample (1: the sensors' noise)"
     if weighed is not None:
-        head += ("base model, replicates' scatter added", "best model, replicates' scatter added")
+        head += ("base model, gap with scatter", "best model, gap with scatter")
         title += say("with_scatter")
         freedom = weighed.get("freedom")
         title += f"; their scatter has {freedom} degrees of freedom)" if freedom else ")"
@@ -176,7 +176,7 @@ def _in_units(diagnosis: Result) -> list[Block]:
         common = _common([row["settings"] for row in conditions])
         lines = [(_settings(row["settings"], but=common), ", ".join(row["trials"]), _number(row["before"]),
                   _number(row["after"])) for row in conditions]  # fmt: skip
-        title = "Chi-square per sample by condition" + (f" ({_settings(common)} in all)" if common else "")
+        title = "Gap by condition" + (f" ({_settings(common)} in all)" if common else "")
         blocks.append(table(("condition", "trials", "before", "after"), lines, title=title))
     return blocks
 
@@ -194,7 +194,7 @@ def _phase_table(diagnosis: Result) -> list[Block]:
 
     head = ("phase", "channel", "samples fitted", "before", "after", "samples held out", "before", "after")
     body = [(*key, *cells(parts.get(False)), *cells(parts.get(True))) for key, parts in rows.items()]
-    return table_of(head, body, title="Chi-square per sample by phase and channel")
+    return table_of(head, body, title="Gap by phase and channel")
 
 
 def _set_aside(diagnosis: Result) -> list[Block]:
@@ -268,8 +268,8 @@ def _evidence(diagnosis: Result) -> list[Block]:
     worse = [" + ".join(row["effects"]) for row in rows if not row["better"]]
     blocks: list[Block] = []
     if better:
-        head = ("candidate (effect:form)", "evidence over the base model [nats]", "chi-square a sample beyond noise",
-                "of the gap closed", "forms tried", "what became of it")  # fmt: skip
+        head = ("candidate (effect:form)", "evidence over the base model [nats]", "excess", "excess removed",
+                "forms tried", "what became of it")  # fmt: skip
         title = "One line for each set of names, in its best form; the most likely first"
         blocks.append(table(head, better, title=title, words=True))
         blocks += _forms(diagnosis, [row[0] for row in better])

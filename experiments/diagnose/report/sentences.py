@@ -154,10 +154,13 @@ def size_sentences(diagnosis: Row) -> list[str]:
     if not sizes:
         return []
     most = max(size["signature"] for size in sizes)
-    words = "; ".join(_size_words(size, is_small=_is_small(size, most) and not _carries(size)) for size in sizes)
+    words = [_size_words(size, is_small=_is_small(size, most) and not _carries(size)) for size in sizes]
     own = [f"{size['effect']} {part}" for size in sizes if (part := _own_words(size.get("own_force")))]
-    carries = f"in the fitted law {' and '.join(own)}. If" if own else "if"
-    return [f"How large: {carries} {say('refitted')} {words}."]
+    carries = f" In the fitted law {' and '.join(own)}." if own else ""
+    if len(sizes) == 1:
+        return [f"How large:{carries} {say('refitted_one', effect=sizes[0]['effect'])} {words[0]}."]
+    each = "; ".join(f"without {size['effect']} {part}" for size, part in zip(sizes, words, strict=True))
+    return [f"How large:{carries} {say('refitted')} {each}."]
 
 
 def remark_sentences(diagnosis: Row) -> list[str]:
@@ -180,7 +183,7 @@ def worse_sentences(diagnosis: Row) -> list[str]:
         held = " of trials held out" if row["held_out"] else ""
         few = f" ({row['samples']} samples)" if row.get("samples", _FEW) < _FEW else ""
         parts.append(f"{row['channel']} in phase {row['phase']}{held}{few} {_from_to(row)}")
-    return [f"It makes worse, in chi-square per sample: {'; '.join(parts)}."] if parts else []
+    return [f"It makes worse, by the gap: {'; '.join(parts)}."] if parts else []
 
 
 def _common(conditions: Sequence[Row]) -> dict[str, float]:
@@ -242,10 +245,10 @@ def _own_words(own: Row | None) -> str:
 
 
 def _size_words(size: Row, *, is_small: bool) -> str:
-    """shaft-friction changes the force by 0.4 N (root mean square, 1.2 N at most), 21 % of it, 9 times the noise"""
-    times = f"{numeral(size['signature'], 2)} times the noise of all readings"
+    """by 0.4 N in force (root mean square; 1.2 N at most), 21 % of it, 9 times the noise"""
+    times = f"{numeral(size['signature'], 2)} times the noise"
     if size["channel"] is None:
-        return f"{size['effect']} changes nothing that can be seen"
+        return "by nothing that can be seen"
     share = f", {100 * size['share']:.2g} % of it" if size["share"] is not None else ""
     return say("is_small" if is_small else "changes", size=size, share=share, times=times)
 
@@ -318,7 +321,7 @@ def told_tables(diagnosis: Row) -> list[dict[str, Any]]:
     if diagnosis["by_phase"] and diagnosis["verdict"] != "none":
         tables += _in_units(diagnosis)
         tables.append({
-            "title": "chi-square per sample by phase and channel", "head": ["phase", "channel", *_STAGES],
+            "title": "gap by phase and channel", "head": ["phase", "channel", *_STAGES],
             "rows": _by_stage(diagnosis["by_phase"], ("phase", "channel"), ("before", "after"), numeral),
         })  # fmt: skip
     if aside := diagnosis.get("set_aside", []):
@@ -335,7 +338,7 @@ def told_tables(diagnosis: Row) -> list[dict[str, Any]]:
         title = "candidates, the best form of each" + (f" ({worse})" if worse else "")
         tables.append({
             "title": title if better else say("none_better"),
-            "head": ["candidate", "evidence over the base model [nats]", "chi-square a sample beyond noise"],
+            "head": ["candidate", "evidence over the base model [nats]", say("excess")],
             "rows": [[row["candidate"], f"{row['score']:.1f}", f"{row['left']:.3g}"] for row in better or rows],
         })  # fmt: skip
     return tables
@@ -371,7 +374,7 @@ def _in_units(diagnosis: Row) -> list[dict[str, Any]]:
         common = _common(conditions)
         shared = ", ".join(setting_words(*pair) for pair in common.items())
         tables.append({
-            "title": "chi-square per sample by condition" + (f" ({shared} in all)" if shared else ""),
+            "title": "gap by condition" + (f" ({shared} in all)" if shared else ""),
             "head": ["condition", "trials", "before", "after"],
             "rows": [[", ".join(setting_words(*pair) for pair in row["settings"].items() if pair[0] not in common)
                       or "the same", ", ".join(row["trials"]),

@@ -242,7 +242,7 @@ def _candidates(diagnosis: Mapping[str, Any]) -> list[str]:
             return ["No effect of the library could be tried."]
         listed = _closing(sorted(rows, key=lambda row: -(row.get("closes") or 0.0))[:_SHOWN])
         costs = "" if any(row["score"] > 0 for row in rows) else f" {say('costs_more')}"
-        return [f"No effect of the library explains the misfit. Of the misfit beyond the noise, {listed}.{costs}"]
+        return [f"No effect of the library explains the misfit. Of the excess, {listed}.{costs}"]
     if worsens_held_out(diagnosis):
         gaps = {stage: numeral(diagnosis["gap"][stage]["held_out"]) for stage in ("before", "after")}
         return [say("worse_held_out", names=" + ".join(leading["effects"]), **gaps)]
@@ -264,7 +264,7 @@ def _candidates(diagnosis: Mapping[str, Any]) -> list[str]:
     sentences += unnamed_sentence(diagnosis)
     rest = [row for row in _singles(diagnosis) if row["effects"][0] not in leading["effects"]][: _SHOWN - 1]
     if rest and not certain:
-        sentences.append(f"Of the misfit of the base model beyond the noise{_weighed(diagnosis)}, {_closing(rest)}.")
+        sentences.append(f"Of the base model's excess{_weighed(diagnosis)}, {_closing(rest)}.")
     return [*sentences, *_why_unknown(diagnosis)]
 
 
@@ -329,9 +329,7 @@ def _closes(gap: Mapping[str, Any]) -> str:
         before, after = gap["before"][key], gap["after"][key]
         if before is None or after is None:
             continue
-        share = (
-            f", {_share(1 - max(after - 1, 0.0) / (before - 1))} of the misfit beyond the noise" if before > 1 else ""
-        )
+        share = f" ({_share(1 - max(after - 1, 0.0) / (before - 1))} of the misfit)" if before > 1 else ""
         parts.append(f"from {numeral(before)} to {numeral(after)} {words}{share}")
     return " and ".join(parts)
 
