@@ -19,7 +19,7 @@ from experiments.diagnose.noise.colour import Colour
 from experiments.diagnose.noise.jitter import Jitter
 from experiments.diagnose.noise.replicates import groups_of
 from experiments.diagnose.noise.spectrum import Line, lines_of
-from vis.page.numbers import fitted, foldable
+from vis.page.numbers import fitted, foldable, quote
 from vis.page.sentences import Sentences
 
 from .deciding import Gap, certain, closes, gap_of, is_misfit_of_form, smallest, unscattered, values_of_all
@@ -397,8 +397,10 @@ def _inflations(one: Fit, other: Fit) -> tuple[float, float]:
 
 
 def _with_error(force: float, std: float) -> str:
-    """0.112 ± 0.016 N, half of a 95 % interval; a force that the model gives exactly has no error."""
-    return foldable(fitted({"value": force, "std": std or None, "unit": "N"}))
+    """0.112 ± 0.016 N, half of a 95 % interval; of a force that the model gives exactly, why it has no error."""
+    if not std:
+        return say("exact_force", force=foldable(quote(force, None, "N")))
+    return foldable(fitted({"value": force, "std": std, "unit": "N"}))
 
 
 def _between(one: Fit) -> Array:

@@ -77,7 +77,7 @@ def sure_sentences(diagnosis: Row) -> list[str]:
         if sure:
             sure += f"; the nearest other name, {near['effect']}, is {behind_words(near)} ({LEAD:.0f} are needed), "
         sure += f"and its change of the data is {near['angle_deg']:.0f} degrees away (0: the same): {apart}"
-    return [*sentences, *size_sentences(diagnosis), *remark_sentences(diagnosis), *([f"{sure}."] if sure else []),
+    return [*sentences, *size_sentences(diagnosis), *([f"{sure}."] if sure else []),
             *_how_often(diagnosis), *unnamed_sentence(diagnosis)]  # fmt: skip
 
 

@@ -23,7 +23,14 @@ from .sentences import (
     unnamed_sentence,
     worse_sentences,
 )
-from .to_use import law_sentences, near_model_sentences, number_words, peak_sentences, use_sentences
+from .to_use import (
+    law_sentences,
+    near_model_sentences,
+    neutral_sentences,
+    number_words,
+    peak_sentences,
+    use_sentences,
+)
 
 __all__ = ["scatter_sentence", "summary_sentences", "title_words"]
 
@@ -99,17 +106,18 @@ def summary_sentences(diagnosis: Mapping[str, Any]) -> list[str]:
         gap = {key: "-" if value is None else numeral(value) for key, value in diagnosis["gap"]["after"].items()}
         first = [say("noisy", gap=gap, stds=stds)]
     elif diagnosis["verdict"] == "unknown":
-        first = [*_candidates(diagnosis), *_left(diagnosis), *worse_sentences(diagnosis)]
+        first = [*_candidates(diagnosis), *_left(diagnosis)]
     else:
-        first = [*sure_sentences(diagnosis), *worse_sentences(diagnosis)]
+        first = sure_sentences(diagnosis)
     if diagnosis["verdict"] != "unknown":
         first += [*_residue(diagnosis), *_allowed(diagnosis)]
     aside = list(dict.fromkeys(row["trial"] for row in diagnosis.get("set_aside", [])))
     apart = [say("took_no_part", trials=", ".join(aside))] if aside else []
     use = [*use_sentences(diagnosis), *law_sentences(diagnosis)]
-    return [*_doubts(diagnosis), *_stated_far(diagnosis), *peak_sentences(diagnosis), *use, *apart, *first,
-            *scatter_sentence(diagnosis), *_no_replicates(diagnosis),
-            *near_model_sentences(diagnosis), f"Next experiment: {ask}"]  # fmt: skip
+    doubts = [*_doubts(diagnosis), *_stated_far(diagnosis), *remark_sentences(diagnosis), *peak_sentences(diagnosis),
+              *worse_sentences(diagnosis), *neutral_sentences(diagnosis), *_no_replicates(diagnosis)]  # fmt: skip
+    return [*doubts, *use, *apart, *first, *scatter_sentence(diagnosis), *near_model_sentences(diagnosis),
+            f"Next experiment: {ask}"]  # fmt: skip
 
 
 def _stated_far(diagnosis: Mapping[str, Any]) -> list[str]:
@@ -260,7 +268,7 @@ def _candidates(diagnosis: Mapping[str, Any]) -> list[str]:
         apart = "these trials distinguish the two" if near["told_apart"] else "these trials do not distinguish the two"
         first += say("nearest", near=near, behind=behind_words(near), apart=apart)
     sentences.append(f"{first}.")
-    sentences += [*_numbers(leading), *size_sentences(diagnosis), *remark_sentences(diagnosis)]
+    sentences += [*_numbers(leading), *size_sentences(diagnosis)]
     sentences += unnamed_sentence(diagnosis)
     rest = [row for row in _singles(diagnosis) if row["effects"][0] not in leading["effects"]][: _SHOWN - 1]
     if rest and not certain:
