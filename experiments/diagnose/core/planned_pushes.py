@@ -1,7 +1,7 @@
 """Whether the best push of a search separates two models at all: beds and noise may differ by more than they do.
 
 Of one reading where two predictions differ most; `Planned.apart` has it. A single push is in one bed, whose stiffness
-is a factor on the whole force, so that more readings of the push do not help.
+is a factor on the whole force. More readings of the push do not help.
 """
 
 import math
@@ -40,7 +40,7 @@ def separates(apart: Mapping[str, float]) -> bool:
 
 
 def pushes_needed(apart: Mapping[str, float]) -> int | None:
-    """How many such pushes, each in a bed prepared anew, separate the two by their mean; None for more than 20, and
+    """How many such pushes, each in a bed prepared anew, separate the two by their mean. None for more than 20, and
     where the models' own errors are too large."""
     room = (apart["one_N"] - apart["other_N"]) ** 2 - (NORMAL * apart["model_std_N"]) ** 2
     count = math.ceil((NORMAL * apart["scatter_N"]) ** 2 / room) if room > 0 else math.inf

@@ -91,8 +91,9 @@ def peak_of(law: Law, like: Penetration) -> float:
 
 
 def returned_std(law: Law, likes: Sequence[Penetration]) -> float | None:
-    """Standard error, by that of the fit, of the share of the work of loading that unloading returns, mean of `likes`,
-    driven runs; None as `PeakError.fit`. A stiffer bed raises both works alike."""
+    """Standard error of the share of the work of loading that unloading returns, by the errors of the fit.
+
+    The share is a mean over `likes`, driven runs. None as `PeakError.fit`. A stiffer bed raises both works alike."""
     if not likes:
         return None
     tables = [_moved(law, like) for like in likes]
