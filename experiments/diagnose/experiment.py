@@ -28,7 +28,8 @@ from .fit.problem import Problem
 from .noise.colour import together
 from .push.frame import at_the_tip
 from .report.document import write_diagnosis
-from .report.sentences import findings_in_words, spread_sentences, told_tables, where_sentences
+from .report.sentences import findings_in_words, told_tables, where_sentences
+from .report.spread import spread_sentences
 from .report.summary import summary_sentences, title_words
 
 __all__ = ["check", "diagnose_campaign", "make_problem", "resume", "run"]

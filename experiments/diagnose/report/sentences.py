@@ -1,5 +1,6 @@
 """Sentences and tables of a diagnosis: where the model fails, how large and how sure effects are, the candidates."""
 
+import math
 import re
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
@@ -19,7 +20,7 @@ from vis.page.sentences import Sentences
 __all__ = [
     "behind_words", "candidate_rows", "findings_in_words", "remark_sentences", "say",
     "setting_words", "shares_words",
-    "size_sentences", "small_names", "spread_sentences", "sure_sentences", "told_tables", "unnamed_sentence",
+    "size_sentences", "small_names", "sure_sentences", "told_tables", "unnamed_sentence",
     "where_sentences", "worse_sentences",
 ]  # fmt: skip
 
@@ -105,27 +106,6 @@ def _least(counted: Row) -> float:
     return 100 * float(beta.ppf(1 - _BOUND, counted["right"], counted["named"] - counted["right"] + 1))
 
 
-_SPREAD_UNITS = {
-    "force": "N, each in its own way", "depth": "m, each in its own way", "accel": "m/s2, each in its own way",
-    "depth zero": "m", "force zero": "N",
-}  # fmt: skip
-"""Of channels and zeros in `model_std`, which holds relative numbers otherwise."""
-
-
-def spread_sentences(model_std: Mapping[str, float], *, granular: bool) -> list[str]:
-    """By what replicates differ beyond the sensors, in a sentence; of several kinds the sizes are guesses.
-    `model_std`: kind -> standard deviation; `granular`: whether the ground is a bed of grains."""
-    if len(model_std) > 1:
-        sizes = {k: (s, _SPREAD_UNITS[k]) if k in _SPREAD_UNITS else (100 * s, "%") for k, s in model_std.items()}
-        return [say("spreads", kinds=" and ".join(f"{k} by {s:.2g} {unit}" for k, (s, unit) in sizes.items()))]
-    whose = "the bed" if granular else "the surface, the rig or the start"
-    return [
-        say("spread", kind=kind, std=std, unit=_SPREAD_UNITS.get(kind, "(relative)"),
-            of=say("spread_zero") if kind.endswith(" zero") else whose)
-        for kind, std in model_std.items()
-    ]  # fmt: skip
-
-
 def behind_words(rival: Row) -> str:
     """33 nats behind; where prediction was compared, both numbers, since the larger of the two decides."""
     evidence, left_out = rival["evidence_behind"], rival.get("left_out_behind")
@@ -194,9 +174,14 @@ def _common(conditions: Sequence[Row]) -> dict[str, float]:
 
 
 def _worst(rows: Sequence[Row], factor: float) -> list[Row]:
-    """Those that grow by `factor` and are past noise then, at most three, by what is added over all samples."""
-    grown = [row for row in rows if row["after"] > max(factor * row["before"], _STANDING)]
+    """Those that grow by `factor` and are past noise and its chance then, three standard deviations of a mean square; at
+    most three, by what is added over all samples."""
+    grown = [row for row in rows if row["after"] > max(factor * row["before"], _STANDING, _by_chance(row))]
     return sorted(grown, key=lambda row: row["samples"] * (row["before"] - row["after"]))[:_WORSE_SHOWN]
+
+
+def _by_chance(row: Row) -> float:
+    return 1 + 3 * math.sqrt(2 / max(row.get("samples", _FEW), 1))
 
 
 def _from_to(row: Row) -> str:

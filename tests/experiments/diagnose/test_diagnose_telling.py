@@ -19,13 +19,13 @@ from experiments.diagnose.report.sentences import (
     candidate_rows,
     remark_sentences,
     size_sentences,
-    spread_sentences,
     sure_sentences,
     told_tables,
     unnamed_sentence,
     where_sentences,
     worse_sentences,
 )
+from experiments.diagnose.report.spread import spread_sentences
 from experiments.diagnose.report.summary import _numbers, scatter_sentence, summary_sentences, title_words
 from rigid.terms import CANDIDATES
 from vis.diagnose.evidence import _kind

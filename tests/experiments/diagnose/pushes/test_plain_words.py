@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from experiments.diagnose.push.remarks import Push, facts
-from experiments.diagnose.report.sentences import size_sentences
+from experiments.diagnose.report.sentences import size_sentences, worse_sentences
 from experiments.diagnose.report.summary import _allowed, summary_sentences, title_words
 from experiments.diagnose.report.to_use import number_words, unloading_sentences
 
@@ -100,3 +100,10 @@ def test_what_is_doubtful_stands_before_the_numbers_to_use():
     starts = ("Hard to believe", "It makes worse", "Not distinguished")
     places = [place for start in starts for place, one in enumerate(said) if one.startswith(start)]
     assert len(places) == 3 and places == sorted(places) and max(places) < use
+
+
+def test_two_samples_that_get_worse_by_chance_are_no_doubt():
+    """Mean squares of two samples scatter by 1: 2.8 is chance, 6 is not."""
+    row = {"phase": "free", "channel": "force", "held_out": False, "samples": 2, "before": 1.2, "after": 2.8}
+    assert worse_sentences({"by_phase": [row]}) == []
+    assert len(worse_sentences({"by_phase": [row | {"after": 6.0}]})) == 1
