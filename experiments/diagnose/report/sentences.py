@@ -174,7 +174,7 @@ def _common(conditions: Sequence[Row]) -> dict[str, float]:
 
 
 def _worst(rows: Sequence[Row], factor: float) -> list[Row]:
-    """Those that grow by `factor` and are past noise and its chance then, three standard deviations of a mean square; at
+    """Those that grow by `factor` and are past noise and its chance then, three deviations of a mean square; at
     most three, by what is added over all samples."""
     grown = [row for row in rows if row["after"] > max(factor * row["before"], _STANDING, _by_chance(row))]
     return sorted(grown, key=lambda row: row["samples"] * (row["before"] - row["after"]))[:_WORSE_SHOWN]
