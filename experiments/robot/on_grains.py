@@ -35,6 +35,7 @@ from rigid.spatial.quaternions import to_matrix
 
 from . import say
 from .energy import idle
+from .feet import buried_words
 from .flight import fall_warning, touch_words
 from .forms import MOST_INERTIA, NO_FORMS, Forms, OnLaw, forms_of, with_grains
 from .on_laws import answer_of_run, follow_on, on_law
@@ -72,7 +73,7 @@ class RobotFollowed(Followed[RobotRun]):
 
     def __init__(self, settings: RobotSettings, plan: RobotPlan) -> None:
         self.settings, self.plan = settings, plan
-        self.weight, self._half_way = plan.numbers["weight"].value, False
+        self.weight, self._half_way, self._buried = plan.numbers["weight"].value, False, False
 
     def run_on_law(self, *, as_spring: bool = False) -> RobotRun:
         """The robot on its surface law, ready to be stepped; `as_spring`: explicitly, on the spring-damper."""
@@ -101,7 +102,10 @@ class RobotFollowed(Followed[RobotRun]):
         return super().finish(run, folder, progress)
 
     def notice(self, run: RobotRun) -> str | None:
-        """Once, half way: that the actuators have given no work."""
+        """Once, half way: that the actuators have given no work. Once: that what is fixed to a foot is in the ground."""
+        if not self._buried and (said := buried_words(run)):
+            self._buried = True
+            return f"warning: {said[0]}"
         if self._half_way or run.fraction < 0.5:
             return None
         self._half_way = True
@@ -254,6 +258,8 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
         self._announce(self.told, progress)
         for sentence in self._softness():
             progress.message(sentence)
+        for sentence in buried_words(self.beside, on=self.settings.default_law):
+            progress.message(f"warning: {sentence}")
         if idle(self.plan, self.beside):
             law, time = self.settings.default_law, self.beside.time
             progress.message(f"warning: {say('idle_on_law', law=law, time=time)}")

@@ -27,6 +27,7 @@ from .energy import MOST_RESIDUAL, balance_warning, idle
 from .feet import (
     bounce_warning,
     bounce_words,
+    buried_words,
     crater_losses,
     feet_quantities,
     feet_reached,
@@ -181,8 +182,9 @@ def conclude(
         say("idle", time=run.time) if idle(plan, run) else None,
         *plan.warnings_of_run, balance_warning(settings, run), grains.unsettled_warning(run.master),
         say("unstable", load=run.load, most=run.most_load) if run.load > run.most_load else None,
+        *buried_words(run),
         say("went_below", name=run.lowest_other[1], depth=-1e3 * run.lowest_other[0])
-        if run.lowest_other[0] < -BELOW else None,
+        if run.lowest_other[0] < -BELOW and run.lowest_other[1] != run.buried.name else None,
         _cut_off(run, heights, flights) if flights.at_end else None, pushes_off(run, flights),
         *bounce_warning(run, crater_losses(run, heights, apart=APART), plan.law),
         *(too_deep(run, plan.law) if plan.fitted is None else []),
