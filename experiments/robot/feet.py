@@ -14,8 +14,8 @@ from . import say
 from .plan import RobotPlan
 
 __all__ = [
-    "FEW", "bounce_warning", "bounce_words", "buried_words", "crater_losses", "feet_quantities", "feet_reached", "heights_of",
-    "too_deep", "too_fast",
+    "FEW", "bounce_warning", "bounce_words", "buried_words", "crater_losses", "feet_quantities", "feet_reached",
+    "heights_of", "too_deep", "too_fast",
 ]  # fmt: skip
 
 FEW = 6  # Most feet whose numbers are quantities of their own
