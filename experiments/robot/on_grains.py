@@ -370,7 +370,9 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
             way = high - low
             need = way + 2 * s.grain
             if s.bed_size[axis] < need:
+                why = "" if s.default_law == "spring-damper" else say("why_spring", law=s.default_law)
                 words = {"size": s.bed_size[axis], "low": low, "high": high, "wanted": math.ceil(100 * need) / 100}
+                words["why"] = why
                 faults.append(say("too_short", s=s, name=name, **words))
                 need += SPARE * way
             sizes[axis] = max(s.bed_size[axis], math.ceil(100 * max(need, wide) - 1e-6) / 100)
