@@ -219,9 +219,7 @@ def conclude(
             "beside_duration": beside.time,
         }  # fmt: skip
         sentences.append(say("modulus", young=1e-6 * softening.young, factor=softening.factor))
-        if settings.sleep:
-            done, awake = (result["grains"][key] for key in ("grain_steps", "grain_steps_all_awake"))
-            sentences.append(say("slept", share=done / awake))
+        sentences += grains.sleep_words(settings, run, bed)
         warnings += [
             grains.reversal_warning(run.dissipation_reversal),
             grains.sides_warning(bed),
