@@ -1,7 +1,7 @@
 """How many grain-steps a second this machine makes, measured by its runs and kept for the estimates of later ones.
 
 The cache has `pace.json`: the latest runs with the number of grains that they computed in a step. An estimate takes the
-fastest of the last runs of about as many grains: one beside other work is slower.
+fastest of the last runs of about as many grains. Runs on a busy machine are not kept.
 """
 
 import json
@@ -18,6 +18,7 @@ KEPT = 40  # Runs that the file has
 LATEST = 5  # Of those of about as many grains so many count
 ALIKE = 4.0  # Numbers of grains that are about the same, the larger over the smaller [1]
 SPELL = 1.0  # A reading is of so long [s]
+BUSY = 1.25  # Processes that want to run, over processors, above which a machine is busy; one more is allowed [1]
 LEAST = 5  # Readings of a run, below which it is not kept
 
 
@@ -68,9 +69,17 @@ class PaceMeter:
             self._spell = _Spell(now, grain_steps)
 
     def keep(self) -> None:
-        """Keep the run's pace for later ones, if it has enough readings."""
-        if self._runtime and len(self.rates) >= LEAST:
+        """Keep the run's pace for later ones, if it has enough readings and the machine is not busy."""
+        if self._runtime and len(self.rates) >= LEAST and not _busy():
             keep_pace(self._runtime, grains=median_low(self.awake), rate=median_low(self.rates))
+
+
+def _busy() -> bool:
+    """Whether more is to be computed than there are processors for; False where the system does not say."""
+    try:
+        return os.getloadavg()[0] > BUSY * (os.cpu_count() or 1) + 1
+    except (AttributeError, OSError):
+        return False
 
 
 def _kept() -> list[dict[str, Any]]:

@@ -9,7 +9,8 @@ from experiments.runs.progress import Progress
 
 @pytest.fixture
 def kept(tmp_path, monkeypatch):
-    """The file, in a folder of its own."""
+    """The file, in a folder of its own, on a quiet machine."""
+    monkeypatch.setattr(pace.os, "getloadavg", lambda: (1.0, 1.0, 1.0), raising=False)
     path = tmp_path / "cache" / "pace.json"
     monkeypatch.setattr(pace, "_file", lambda: path)
     return path
@@ -55,6 +56,13 @@ def test_a_short_run_one_in_lammps_and_a_damaged_file_are_no_pace(kept):
         assert known_pace("cpu-2", grains=10_000) is None
     run_at(8e6)
     assert known_pace("cpu-2", grains=10_000) == pytest.approx(8e6, rel=0.01)
+
+
+def test_the_pace_of_a_busy_machine_is_not_kept(kept, monkeypatch):
+    monkeypatch.setattr(pace.os, "cpu_count", lambda: 2)
+    monkeypatch.setattr(pace.os, "getloadavg", lambda: (9.0, 1.0, 1.0), raising=False)
+    run_at(8e6)
+    assert not kept.exists()
 
 
 def test_the_file_stays_small_and_a_cache_that_cannot_be_written_fails_no_run(kept):
