@@ -35,14 +35,13 @@ from rigid.platform.rig import STANDARD_GRAVITY
 from . import say
 from .bearing import STICKING, resistance_of
 from .bed_progress import BedProgress
-from .durations import RAIN, preparation_time
 from .following import CHECKPOINT, Followed, Run
 from .lammps import in_lammps
 from .recipes import recipe_of
 from .settings import GrainsSettings
 from .sizes import carried_height, expected_grain_count
 from .softening import Softening, check_young, run_limit, soften_material
-from .staged import staged_bed
+from .staged import RAIN, preparation_time, staged_bed
 from .where import check_where
 
 __all__ = ["MARGIN", "Forecast", "PlatformOnBed"]

@@ -12,10 +12,9 @@ from dem.prepare import prepare
 from dem.prepare.bedfile import find_bed
 from experiments.grains.bearing import STICKING, Bearing, bearing_of, sinks_past, strength
 from experiments.grains.bed_progress import BedProgress
-from experiments.grains.durations import RAIN
 from experiments.grains.recipes import recipe_of
 from experiments.grains.softening import Softening, bearing_gradient, drop_depth, soften_material, stable_overlap
-from experiments.grains.staged import come_to_rest, staged_bed
+from experiments.grains.staged import RAIN, come_to_rest, staged_bed
 from experiments.runs.progress import Progress
 from experiments.runs.stopping import held_back
 from experiments.runs.types import Json

@@ -12,7 +12,7 @@ from typing import Any, Literal
 from coupling import Drive, Drop, Run, SetDown
 from coupling.planar_body import PLACEMENT_TIME
 from dem.engine.runtime import usable_cores
-from experiments.grains import durations
+from experiments.grains import staged
 from experiments.grains.bearing import OF_PLATE
 from experiments.runs.folder import RunFolder
 from experiments.runs.pace import known_pace, runtime_name
@@ -173,7 +173,7 @@ def preparation_time(settings: PenetrateSettings, stages: Sequence[str] | None, 
     if settings.bed is not None:
         return 0.0
     tapped = settings.packing is not None or any("compact" in stage for stage in stages or ())
-    return durations.preparation_time(settings.bed_size[2], gravity, tapped=tapped)
+    return staged.preparation_time(settings.bed_size[2], gravity, tapped=tapped)
 
 
 def step_seconds(settings: PenetrateSettings) -> float:
@@ -210,7 +210,7 @@ class PenetratePlan:
             if todo:
                 costs[_bed(seed)] = self._bed_cost()
                 if self._gravity != settings.gravity and settings.bed is None:
-                    rest = durations.rest_time(self._gravity, grain=settings.grain)
+                    rest = staged.rest_time(self._gravity, grain=settings.grain)
                     costs[rest_stage(settings, seed)] = rest / step
             costs |= {unit.title: self._cost(unit) for unit in todo}
         grains = settings.grain_count

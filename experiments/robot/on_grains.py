@@ -21,12 +21,11 @@ from coupling.robot.soles import plan_area
 from coupling.robot.stability import ExpectedBed, check_exchange
 from dem import Bed
 from experiments.grains.bed_progress import Stages
-from experiments.grains.durations import lowering_time
 from experiments.grains.following import Followed
 from experiments.grains.lammps import check_lammps, moved_to_lammps
 from experiments.grains.on_bed import Forecast, PlatformOnBed
 from experiments.grains.softening import Softening, run_limit
-from experiments.grains.staged import lower_gravity
+from experiments.grains.staged import lower_gravity, lowering_time
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
 from experiments.runs.result import Result
@@ -371,9 +370,9 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
             need = way + 2 * s.grain
             if s.bed_size[axis] < need:
                 why = "" if s.default_law == "spring-damper" else say("why_spring", law=s.default_law)
-                words = {"size": s.bed_size[axis], "low": low, "high": high, "wanted": math.ceil(100 * need) / 100}
-                words["why"] = why
-                faults.append(say("too_short", s=s, name=name, **words))
+                words = {"low": low, "high": high, "wanted": math.ceil(100 * need) / 100}
+                said = say("too_short", s=s, name=name, size=s.bed_size[axis], why=why, **words)
+                faults.append(said)
                 need += SPARE * way
             sizes[axis] = max(s.bed_size[axis], math.ceil(100 * max(need, wide) - 1e-6) / 100)
         deepest, on = self.depth_expected

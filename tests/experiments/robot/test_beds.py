@@ -160,7 +160,7 @@ def test_a_run_with_sleep_states_what_it_saved_and_that_it_saved_next_to_nothing
     result = robot.run(RobotSettings(**given, frame_count=0, sleep=True), tmp_path, progress=progress)
     own = [one for one in result["departures"]["sentences"] if "leep" in one]
     assert own == [one for one in said if one in own] and len(own) == 2
-    assert "100% of" in own[0] and "0 of 768 grains" in own[0]
+    assert "100% of" in own[0] and "0 of 768" in own[0]
 
 
 def test_a_bed_of_which_a_part_sleeps_states_how_many_grains_do():
@@ -169,7 +169,7 @@ def test_a_bed_of_which_a_part_sleeps_states_how_many_grains_do():
     master = SimpleNamespace(count=15)
     run = SimpleNamespace(master=master, placing_steps=5, samples={"grain_steps": np.array([5e4, 7e4, 9e4])})
     (said,) = sleep_words(RobotSettings(**ON_BED, sleep=True, substeps=10), run, bed)
-    assert "40% of" in said and "700 of 1,000 grains" in said and "200 are slow" in said
+    assert "40% of" in said and "700 of 1,000" in said and "200 are slow" in said
     assert sleep_words(RobotSettings(**ON_BED), run, bed) == []
 
 
