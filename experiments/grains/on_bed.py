@@ -298,7 +298,8 @@ class PlatformOnBed(Followed[Run], Generic[Settings, Run, Expected]):
         s: Any = self.settings
         if s.ground == "lammps":
             return None
-        runtime = runtime_name(arch=s.arch, threads=s.threads or len(usable_cores()))
+        threads = (s.threads or len(usable_cores())) if s.arch == "cpu" else 1  # as `dem.engine.runtime.start`
+        runtime = runtime_name(arch=s.arch, threads=threads)
         return known_pace(runtime, grains=self.grain_count())
 
     @property
