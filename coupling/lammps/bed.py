@@ -1,7 +1,8 @@
 """A bed whose grains live in LAMMPS: what `BedGround` and the experiments use of `dem.Bed`, answered by LAMMPS.
 
-The grains begin where those of a `dem.Bed` are, with their velocities and spins. The springs of friction and rolling
-begin without stretch, since LAMMPS reads none; `settle` lets the grains come to rest again.
+The grains begin where those of a `dem.Bed` are, with their velocities, spins and the springs of their contacts
+(`coupling.lammps.springs`). Where these do not go over, they begin without stretch and `settle` lets the grains come to
+rest again.
 """
 
 import math
@@ -22,6 +23,7 @@ from .law import WALL_TRIAL, MeanContact, kinetic_energy, law_words, spring_ener
 from .process import Lammps, cohesion_fault
 from .regions import MovingBody, check_count, check_thickness, pieces_of
 from .rolling import RollingClasses
+from .springs import LayoutError, springs_of, with_springs
 from .words import box_of, data_file, digits, spheres
 
 __all__ = ["LammpsBed"]
@@ -39,6 +41,10 @@ class LammpsBed:
     """The grains of ``bed`` in LAMMPS on ``ranks`` processes, over the same floor, periodic in x and y.
 
     ``begin``: where LAMMPS' box begins along x [m]. A body does not reach across its ends.
+
+    Attributes:
+        springs: number of contacts whose stretched springs went over [1]
+        springs_fault: why none did, though some were stretched; empty otherwise
 
     Raises ValueError, naming it, for what has no counterpart: bodies that are already in the bed, a restitution below
     LAMMPS' dashpot, a cohesion that this LAMMPS refuses. Raises LammpsMissingError where LAMMPS cannot be started.
@@ -80,6 +86,7 @@ class LammpsBed:
         self._lammps = Lammps(ranks)
         self._wears = self._wears_out()
         self._begin_anew(grains)
+        self.springs, self.springs_fault = self._take_springs(bed)
         self._origin = self._dumped()[:, 4:7]
 
     def __repr__(self) -> str:
@@ -100,6 +107,23 @@ class LammpsBed:
         text = data_file(box, atoms, moving, types=self._classes.count)
         (self._lammps.folder / "grains.data").write_text(text, encoding="ascii")
         self._lammps.tell([*self._head(), "read_data grains.data", *self._interactions()])
+
+    def _take_springs(self, bed: Bed) -> tuple[int, str]:
+        """Give the contacts in LAMMPS the springs of those in ``bed``; `springs` and `springs_fault`."""
+        pairs, floor = springs_of(bed, (np.array(self._grain_row), self._rows[FLOOR]))
+        stretched = pairs.stretched + floor.stretched
+        if not stretched:
+            return 0, ""
+        self._prepare()  # LAMMPS finds its contacts
+        try:
+            kept = with_springs(
+                self._kept().tobytes(), pairs, floor,
+                radii=self.radius, classes=self._classes, floor_radius=self._mean.radius,
+            )  # fmt: skip
+        except LayoutError as fault:
+            return 0, str(fault)
+        self._read_kept(np.frombuffer(kept, dtype=np.uint8))
+        return stretched, ""
 
     def _wears_out(self) -> bool:
         """Whether a second setup changes the dashpots of walls (`coupling.lammps.law`)."""
@@ -436,15 +460,10 @@ class LammpsBed:
 
         The run goes on to the same motion but for rounding, since LAMMPS makes new lists in another order.
         """
-        self._lammps.tell(["write_restart kept.restart noinit"])
-        self._lammps.wait()
-        path = self._lammps.folder / "kept.restart"
-        kept = np.frombuffer(path.read_bytes(), dtype=np.uint8).copy()
-        path.unlink()
         rows = [[*body.position, *body.velocity, *body.turn, *body.spin, body.angle, *body.base.ravel(), body.made]
                 for body in self._bodies]  # fmt: skip
         return {
-            "restart": kept,
+            "restart": self._kept(),
             "bodies": np.array(rows, dtype=float).reshape(-1, 24),
             "numbers": np.array([self.steps, self.grain_steps, self.surface, self.packing_fraction]),
             "origin": self._origin.copy(),
@@ -457,8 +476,6 @@ class LammpsBed:
             raise ValueError("the checkpoint of this bed in LAMMPS is of an earlier version: run it anew")
         if len(rows) != len(self._bodies):
             raise ValueError(f"the state has {len(rows)} bodies, this bed has {len(self._bodies)}")
-        path = self._lammps.folder / "kept.restart"
-        path.write_bytes(np.asarray(state["restart"], dtype=np.uint8).tobytes())
         steps, grain_steps, self.surface, self.packing_fraction = (float(x) for x in np.asarray(state["numbers"]))
         self.steps, self.grain_steps = int(steps), int(grain_steps)
         self._origin = np.array(state["origin"], dtype=float)
@@ -467,12 +484,27 @@ class LammpsBed:
             commands += body.take_up(row[:-1], self.steps)
             if row[-1]:
                 commands += body.create()
+        self._read_kept(state["restart"], commands)
+        self._followed = self.steps
+
+    def _kept(self) -> Vector:
+        """LAMMPS' restart file, as bytes."""
+        self._lammps.tell(["write_restart kept.restart noinit"])
+        self._lammps.wait()
+        path = self._lammps.folder / "kept.restart"
+        kept = np.frombuffer(path.read_bytes(), dtype=np.uint8).copy()
+        path.unlink()
+        return kept
+
+    def _read_kept(self, kept: Vector, commands: Sequence[str] = ()) -> None:
+        """Have LAMMPS begin from these bytes, and then carry out these commands."""
+        path = self._lammps.folder / "kept.restart"
+        path.write_bytes(np.asarray(kept, dtype=np.uint8).tobytes())
         head = [line for line in self._head() if not line.startswith(("units", "atom_style", "boundary"))]
         self._lammps.tell(["clear", *head, f"read_restart {path.name} remap", *self._interactions(), *commands])
         self._lammps.wait()
         path.unlink()
         self._sums, self._set_up, self._worn = np.zeros(0), False, False
-        self._followed = self.steps
 
     def close(self) -> None:
         """End LAMMPS."""
