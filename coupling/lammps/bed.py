@@ -1,8 +1,6 @@
 """A bed whose grains live in LAMMPS: what `BedGround` and the experiments use of `dem.Bed`, answered by LAMMPS.
 
-The grains begin where those of a `dem.Bed` are, with their velocities, spins and the springs of their contacts
-(`coupling.lammps.springs`). Where these do not go over, they begin without stretch and `settle` lets the grains come to
-rest again.
+The grains begin where those of a `dem.Bed` are, with velocities, spins and springs of contacts (`.springs`).
 """
 
 import math
@@ -110,19 +108,16 @@ class LammpsBed:
 
     def _take_springs(self, bed: Bed) -> tuple[int, str]:
         """Give the contacts in LAMMPS the springs of those in ``bed``; `springs` and `springs_fault`."""
-        pairs, floor = springs_of(bed, (np.array(self._grain_row), self._rows[FLOOR]))
-        stretched = pairs.stretched + floor.stretched
+        both = springs_of(bed, (self._grain_row, self._rows[FLOOR]))
+        stretched = sum(each.stretched for each in both)
         if not stretched:
             return 0, ""
         self._prepare()  # LAMMPS finds its contacts
+        raw, by_class = self._lammps.kept(), {"classes": self._classes, "floor_radius": self._mean.radius}
         try:
-            kept = with_springs(
-                self._kept().tobytes(), pairs, floor,
-                radii=self.radius, classes=self._classes, floor_radius=self._mean.radius,
-            )  # fmt: skip
+            self._begin_from(with_springs(raw, *both, radii=self.radius, **by_class))
         except LayoutError as fault:
             return 0, str(fault)
-        self._read_kept(np.frombuffer(kept, dtype=np.uint8))
         return stretched, ""
 
     def _wears_out(self) -> bool:
@@ -317,7 +312,7 @@ class LammpsBed:
         return self._reactions[body][:3], self._reactions[body][3:]
 
     def settle(self, tell: Callable[[float, float], None] | None = None) -> float:
-        """Let the grains come to rest with all bodies fixed; return the time that it took [s]. Time is 0 again.
+        """Let the grains come to rest with all bodies fixed; return the time that it took [s], 0 with their springs.
 
         Rest is that of a prepared bed: mean kinetic energy below 1e-5 m g d. ``tell``: called from time to time with
         the time so far [s] and the kinetic energy over that of rest [1]. Raises RuntimeError where they do not rest.
@@ -325,6 +320,8 @@ class LammpsBed:
         unit = math.sqrt(self.mean_diameter / math.hypot(*self.gravity))
         spell, began = math.ceil(_SPELL * unit / self.time_step), self.steps
         limit = STILL * self.weight * self.mean_diameter
+        if self.springs and not self.steps and self.kinetic_energy < limit:
+            return 0.0
         for _ in range(_MOST_SPELLS):
             self.advance(spell)
             energy = self.kinetic_energy
@@ -463,7 +460,7 @@ class LammpsBed:
         rows = [[*body.position, *body.velocity, *body.turn, *body.spin, body.angle, *body.base.ravel(), body.made]
                 for body in self._bodies]  # fmt: skip
         return {
-            "restart": self._kept(),
+            "restart": np.frombuffer(self._lammps.kept(), dtype=np.uint8).copy(),
             "bodies": np.array(rows, dtype=float).reshape(-1, 24),
             "numbers": np.array([self.steps, self.grain_steps, self.surface, self.packing_fraction]),
             "origin": self._origin.copy(),
@@ -484,26 +481,13 @@ class LammpsBed:
             commands += body.take_up(row[:-1], self.steps)
             if row[-1]:
                 commands += body.create()
-        self._read_kept(state["restart"], commands)
+        self._begin_from(np.asarray(state["restart"], dtype=np.uint8).tobytes(), commands)
         self._followed = self.steps
 
-    def _kept(self) -> Vector:
-        """LAMMPS' restart file, as bytes."""
-        self._lammps.tell(["write_restart kept.restart noinit"])
-        self._lammps.wait()
-        path = self._lammps.folder / "kept.restart"
-        kept = np.frombuffer(path.read_bytes(), dtype=np.uint8).copy()
-        path.unlink()
-        return kept
-
-    def _read_kept(self, kept: Vector, commands: Sequence[str] = ()) -> None:
+    def _begin_from(self, kept: bytes, commands: Sequence[str] = ()) -> None:
         """Have LAMMPS begin from these bytes, and then carry out these commands."""
-        path = self._lammps.folder / "kept.restart"
-        path.write_bytes(np.asarray(kept, dtype=np.uint8).tobytes())
-        head = [line for line in self._head() if not line.startswith(("units", "atom_style", "boundary"))]
-        self._lammps.tell(["clear", *head, f"read_restart {path.name} remap", *self._interactions(), *commands])
-        self._lammps.wait()
-        path.unlink()
+        head = (line for line in self._head() if not line.startswith(("units", "atom_style", "boundary")))
+        self._lammps.begin_from(kept, before=["clear", *head], after=[*self._interactions(), *commands])
         self._sums, self._set_up, self._worn = np.zeros(0), False, False
 
     def close(self) -> None:

@@ -86,7 +86,7 @@ class Springs:
         return int((self.slide.any(axis=1) | self.roll.any(axis=1) | (self.twist != 0)).sum())
 
 
-def springs_of(bed: Bed, rows: Sequence[Vector]) -> tuple[Springs, Springs]:
+def springs_of(bed: Bed, rows: Sequence[Vector | Sequence[float]]) -> tuple[Springs, Springs]:
     """The springs of a bed between its grains, and on its floor. ``rows``: pair parameters of both."""
     state, stuff = bed.state(), bed.material
     ids, x = state["id"].astype(np.int64), state["position"].astype(float)
