@@ -135,6 +135,12 @@ class _Layout:
         """How many numbers there are."""
         return self.before + 3 + self.radii + (4 + self.after) * self.rolling
 
+    @property
+    def empty(self) -> list[int]:
+        """Those that are 0 before a step: all but the twisting angle, which may slide in LAMMPS' setup already."""
+        twist = self.before + 6 + self.radii if self.rolling else -1
+        return [k for k in range(self.before, self.width) if k != twist]
+
     def histories(self, springs: "Springs", roll: Vector) -> Vector:
         """The numbers of these contacts as `first` has them, shape [contact, width]."""
         values = np.zeros((len(springs.first), self.width))
@@ -218,7 +224,7 @@ def _put_pairs(
     if len(found) != len(expected) or (found != expected).any() or (np.diff(keys) == 0).any():
         raise LayoutError(f"its {len(found) // 2} contacts are not the bed's {len(expected) // 2}")
     for each, own in zip(grains, theirs, strict=True):
-        each.put_pairs(values[order[np.searchsorted(keys, own)]])
+        each.put_pairs(values[order[np.searchsorted(keys, own)]], layout)
 
 
 class _Grains:
@@ -269,19 +275,19 @@ class _Grains:
             return as_doubles.astype(np.int64)
         return self._whole(self.pair_at)
 
-    def put_pairs(self, rows: Vector) -> None:
+    def put_pairs(self, rows: Vector, layout: _Layout) -> None:
         """Give the contacts these histories, shape [contact, width]."""
         if not len(rows):
             return
         at = self.pair_at[:, None] + 1 + np.arange(rows.shape[1])
-        if self.values[at].any():
+        if self.values[at[:, layout.empty]].any():
             raise LayoutError("its contacts have a history already")
         self.values[at] = rows
 
     def put_floor(self, row: Vector, values: Vector, layout: _Layout, *, more: int) -> None:
         """The same with the floor; ``row``: in ``values``, -1 for none. ``more``: numbers before the history."""
         at = self.floor_at[:, None] + 1 + np.arange(more, layout.width)
-        if self.values[at].any():
+        if self.values[at[:, [k - more for k in layout.empty]]].any():
             raise LayoutError("its contacts with the floor have a history already")
         touching = row >= 0
         self.values[at[touching]] = values[row[touching], more:]
