@@ -91,6 +91,9 @@ def springs_of(bed: Bed, rows: Sequence[Vector | Sequence[float]]) -> tuple[Spri
     state, stuff = bed.state(), bed.material
     ids, x = state["id"].astype(np.int64), state["position"].astype(float)
     first, second, back = touching_pairs(state)
+    low, high = np.minimum(first, second), np.maximum(first, second)
+    once = np.unique(low * len(ids) + high, return_index=True)[1]  # a pair across chunks is listed by both
+    first, second, back = (each[once] for each in (first, second, back))
     apart = x[first, :3] - x[second, :3]
     apart[:, :2] += back * np.array(bed.size[:2])
     length = np.linalg.norm(apart, axis=1)
@@ -103,8 +106,8 @@ def springs_of(bed: Bed, rows: Sequence[Vector | Sequence[float]]) -> tuple[Spri
         (ids[first], ids[second], r_1 * r_2 / (r_1 + r_2), r_1 + r_2 - length, apart / length[:, None]),
         (ids[near], ids[:0], x[near, 3], x[near, 3] - x[near, 2], up),
     )
-    slides = state["slide"], state["near_slide"][on_floor]
-    rolls = state.get("roll", np.zeros((len(first), 3))), state["near_roll"][on_floor]
+    slides = state["slide"][once], state["near_slide"][on_floor]
+    rolls = state["roll"][once] if "roll" in state else np.zeros((len(first), 3)), state["near_roll"][on_floor]
     found = []
     for row, (one, other, reduced, overlap, n), slide, roll in zip(rows, geometry, slides, rolls, strict=True):
         a = contact_radius(row, stuff.cohesion, overlap, reduced)

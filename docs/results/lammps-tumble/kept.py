@@ -1,9 +1,9 @@
-"""Whole tumbles on our bed and in LAMMPS, whose contacts keep their springs, or lose them and rest anew.
+"""Whole tumbles on our bed and in LAMMPS, from the same grains with the springs of their contacts.
 
     python docs/results/lammps-tumble/kept.py OUT RUN.toml SEED...
 
-Adds three rows for each seed to OUT/kept.csv, with the columns of `pairs.py`: `bed`, `lammps` and `rested`, which is
-LAMMPS without the springs. Writes the motion of each run to OUT/motion-SEED-GROUND.csv.
+Adds two rows for each seed to OUT/kept.csv, with the columns of `pairs.py`, and writes the motion of each run to
+OUT/motion-SEED-GROUND.csv. Ends where springs do not go over.
 """
 
 import csv
@@ -14,26 +14,29 @@ from typing import Any
 
 import pairs
 
-from coupling.lammps import LammpsBed
+import experiments.grains.lammps as lammps
 
 
 def main(out: Path, given: dict[str, Any], seeds: list[int]) -> None:
     """Run each seed."""
     out.mkdir(parents=True, exist_ok=True)
-    own = LammpsBed._take_springs
+    own = lammps.moved_to_lammps
+
+    def moved(*given: Any, **options: Any) -> Any:
+        found = own(*given, **options)
+        print(f"{found}: springs of {found.springs} contacts went over {found.springs_fault}", flush=True)
+        if not found.springs:
+            raise SystemExit(1)
+        return found
+
+    lammps.moved_to_lammps = moved
     for seed in seeds:
-        for ground in ("bed", "lammps", "rested"):
-            LammpsBed._take_springs = own if ground != "rested" else lambda self, bed: (0, "")
-            row = pairs.numbers(seed, "bed" if ground == "bed" else "lammps", given, out)
-            if ground == "rested":
-                (out / f"motion-{seed}-lammps.csv").rename(out / f"motion-{seed}-rested.csv")
-            elif ground == "lammps":
-                (out / f"motion-{seed}-lammps.csv").rename(out / f"motion-{seed}-kept.csv")
-            begun = (out / "kept.csv").exists()
-            with (out / "kept.csv").open("a", newline="", encoding="utf-8") as stream:
-                shown = [seed, ground, *(f"{value:.6g}" for value in row[2:])]
-                csv.writer(stream).writerows([shown] if begun else [pairs.HEAD, shown])
-            print(seed, ground, *row[2:], flush=True)
+        rows = [pairs.numbers(seed, kind, given, out) for kind in ("bed", "lammps")]
+        begun = (out / "kept.csv").exists()
+        with (out / "kept.csv").open("a", newline="", encoding="utf-8") as stream:
+            shown = [[*row[:2], *(f"{value:.6g}" for value in row[2:])] for row in rows]
+            csv.writer(stream).writerows(shown if begun else [pairs.HEAD, *shown])
+        print(*rows, sep="\n", flush=True)
 
 
 if __name__ == "__main__":
