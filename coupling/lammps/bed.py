@@ -39,10 +39,7 @@ class LammpsBed:
     """The grains of ``bed`` in LAMMPS on ``ranks`` processes, over the same floor, periodic in x and y.
 
     ``begin``: where LAMMPS' box begins along x [m]. A body does not reach across its ends.
-
-    Attributes:
-        springs: number of contacts whose stretched springs went over [1]
-        springs_fault: why none did, though some were stretched; empty otherwise
+    ``springs``: the number of contacts whose springs went over [1], and ``springs_fault`` why none did.
 
     Raises ValueError, naming it, for what has no counterpart: bodies that are already in the bed, a restitution below
     LAMMPS' dashpot, a cohesion that this LAMMPS refuses. Raises LammpsMissingError where LAMMPS cannot be started.
@@ -110,13 +107,13 @@ class LammpsBed:
     def _take_springs(self, bed: Bed) -> tuple[int, str]:
         """Give the contacts in LAMMPS the springs of those in ``bed``; `springs` and `springs_fault`."""
         both = springs_of(bed, (self._grain_row, self._rows[FLOOR]))
-        stretched = sum(each.stretched for each in both)
-        if not stretched:
+        if not (stretched := sum(each.stretched for each in both)):
             return 0, ""
         self._prepare()  # LAMMPS finds its contacts
-        raw, by_class = self._lammps.kept(), {"classes": self._classes, "floor_radius": self._mean.radius}
+        raw, of_floor = self._lammps.kept(), self._mean.radius
         try:
-            self._begin_from(with_springs(raw, *both, radii=self.radius, **by_class))
+            kept = with_springs(raw, *both, radii=self.radius, classes=self._classes, floor_radius=of_floor)
+            self._begin_from(kept)
         except LayoutError as fault:
             return 0, str(fault)
         return stretched, ""

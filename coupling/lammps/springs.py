@@ -22,9 +22,9 @@ A history, as atom i has it in a contact with j; n is the normal towards i, R* t
 | 3, with rolling | q, the angle turned; torque -S_t R*^2 q across n | r, of torque -k R*^2 n x r: r = S_t / k q x n |
 | 1, with rolling | q . n, the twisting angle | the same |
 
-k is the rolling spring of the two classes of load (`.rolling`), or of the floor (`.law`). So each torque goes over as it
-is, and the stretch is that of the other spring. Seen from j, n changes its sign: the first three change theirs, r and
-the twisting angle do not.
+k is the rolling spring of the two classes of load (`.rolling`), or of the floor (`.law`). So torques are the same, and
+the stretch is that of the other spring. Seen from j, n changes its sign: the first three change theirs, r and the
+twisting angle do not.
 
 LAMMPS of 2021 with `rescaled` has as many numbers at the fourth place as it has atom types, of which it uses the first.
 That of 2025 has two more at the end with rolling. Its twisting spring is 1/a times as strong as it should be, so that
