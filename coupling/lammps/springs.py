@@ -5,10 +5,10 @@ our springs into these bytes, and LAMMPS reads them again. Bytes that do not mat
 refused (`LayoutError`). Where LAMMPS says what is in `src/write_restart.cpp`, `src/atom_vec.cpp`,
 `src/fix_neigh_history.cpp` and `src/GRANULAR/` (`pair_granular.cpp`, `fix_wall_gran.cpp`, `gran_sub_mod_*.cpp`).
 
-The end of the file: the fixes with data of each atom, as their number and for each its id, its style and a size; pairs
-of a number and a value until -1; for each process a mark, a count and so many doubles; the words of its beginning.
-Each atom has a record: its length, position, id, type, mask, image (whole numbers by their bits), velocity, radius,
-mass, spin. Then follow the fixes' parts, each with its own length first:
+The end of the file has the number of fixes with data of each atom, and for each its id, its style and a size. Then
+follow pairs of a number and a value until -1, and for each process a mark, a count and so many doubles. The last is the
+file's first word. Each atom has a record: its length, position, id, type, mask, image (whole numbers by their bits),
+velocity, radius, mass, spin. Then follow the fixes' parts, each with its own length first:
 
 - `NEIGH_HISTORY_GRANULAR`: the number of partners; for each its id (2021: a double, 2025: by its bits) and its history
 - `floor`: the history, zeros without a contact (with JKR one number is before it)

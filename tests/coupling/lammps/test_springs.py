@@ -85,7 +85,7 @@ def bed_of_pairs(stuff=SAND):
 
 
 @pytest.mark.parametrize("tangential", ["rescaled", "displacement"])
-@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=pytest.mark.long)])
 def test_stretched_springs_push_and_turn_two_grains_in_lammps_as_the_law_says(tangential, ranks):
     """F = 4/3 E* a d n - 8 G* a u; M = -8 G* a (R*^2 q across n + a^2/2 (q . n) n), for the first of each pair."""
     stuff = replace(SAND, tangential=tangential, young=3e7)
@@ -112,6 +112,7 @@ def bed_at_rest():
     return Bed.prepare("sand", size=(0.03, 0.03, 0.03), grain=0.004, seed=5, threads=1)
 
 
+@pytest.mark.long
 def test_each_contact_of_a_bed_of_several_parts_has_one_spring():
     """Our engine computes a bed in parts, and a pair of two parts is in the lists of both."""
     rows = pair_row(SAND), pair_row(SAND, Facing())
@@ -119,7 +120,7 @@ def test_each_contact_of_a_bed_of_several_parts_has_one_spring():
     assert counts[1] == [8 * count for count in counts[0]] and min(counts[0]) > 0
 
 
-@pytest.mark.parametrize("kind", [LammpsBed, FreeLammpsBed])
+@pytest.mark.parametrize("kind", [LammpsBed, pytest.param(FreeLammpsBed, marks=pytest.mark.long)])
 def test_each_grain_of_a_bed_with_floor_has_its_force_and_torque_in_lammps(kind):
     """At the floor LAMMPS' arm of friction is R, ours R - d: the torque differs by the overlap d times the friction."""
     bed = bed_at_rest()
@@ -138,7 +139,7 @@ def test_each_grain_of_a_bed_with_floor_has_its_force_and_torque_in_lammps(kind)
     assert np.abs(turned - torque).max() < 1e-6 * weight * bed.mean_diameter
 
 
-@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=pytest.mark.long)])
 def test_a_bed_at_rest_stays_at_rest_in_lammps_and_its_grains_stay_with_ours(ranks):
     bed, found = bed_at_rest(), []
     for keep in (True, False):
@@ -162,6 +163,7 @@ def test_a_bed_at_rest_stays_at_rest_in_lammps_and_its_grains_stay_with_ours(ran
     assert kept < 0.15 * lost  # 0.005 in LAMMPS of 2021; 0.11 in that of 2025, whose twisting spring is too stiff
 
 
+@pytest.mark.long
 def test_two_ranks_begin_with_the_springs_of_one():
     bed, found = bed_at_rest(), []
     for ranks in (1, 2):
@@ -172,6 +174,7 @@ def test_two_ranks_begin_with_the_springs_of_one():
     assert np.abs(found[0] - found[1]).max() < 1e-9 * np.abs(found[0]).max()
 
 
+@pytest.mark.long
 def test_a_state_that_is_restored_has_the_springs_that_were_kept():
     theirs = LammpsBed(bed_at_rest(), ranks=1)
     theirs.advance(100)
@@ -263,6 +266,7 @@ def test_springs_that_do_not_go_over_begin_at_zero_and_a_sentence_says_why(monke
     assert moved.steps == 0
 
 
+@pytest.mark.long
 def test_grains_keep_their_places_in_memory_while_they_flow():
     """LAMMPS reverses the rolling and twisting springs of two grains whose order in memory changes."""
     bed = bed_at_rest()
