@@ -484,7 +484,7 @@ class LammpsBed:
         self._begin_from(np.asarray(state["restart"], dtype=np.uint8).tobytes(), commands)
         self._followed = self.steps
 
-    def _begin_from(self, kept: bytes, commands: Sequence[str] = ()) -> None:
+    def _begin_from(self, kept: bytes | bytearray, commands: Sequence[str] = ()) -> None:
         """Have LAMMPS begin from these bytes, and then carry out these commands."""
         head = (line for line in self._head() if not line.startswith(("units", "atom_style", "boundary")))
         self._lammps.begin_from(kept, before=["clear", *head], after=[*self._interactions(), *commands])

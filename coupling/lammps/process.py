@@ -236,8 +236,8 @@ class Lammps:
         path.unlink()
         return found
 
-    def begin_from(self, kept: bytes, *, before: Iterable[str], after: Iterable[str]) -> None:
-        """Have it read a restart file, ``before`` and ``after`` which come these commands."""
+    def begin_from(self, kept: bytes | bytearray, *, before: Iterable[str], after: Iterable[str]) -> None:
+        """Have it read a restart file, between these commands."""
         path = self.folder / _KEPT
         path.write_bytes(kept)
         self.tell([*before, f"read_restart {_KEPT} remap", *after])

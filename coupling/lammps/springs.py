@@ -139,28 +139,36 @@ class _Layout:
         return self.before + 3 + self.radii + (4 + self.after) * self.rolling
 
     @property
-    def empty(self) -> list[int]:
-        """Those that are 0 before a step: all but the twisting angle, which may slide in LAMMPS' setup already."""
-        twist = self.before + 6 + self.radii if self.rolling else -1
-        return [k for k in range(self.before, self.width) if k != twist]
+    def used(self) -> list[int]:
+        """Places of the numbers of `histories`."""
+        turning = range(self.before + 3 + self.radii, self.before + 7 + self.radii)
+        return [*range(self.before, self.before + 3 + (self.radii > 0)), *(turning if self.rolling else ())]
 
     def histories(self, springs: "Springs", roll: Vector) -> Vector:
-        """The numbers of these contacts as `first` has them, shape [contact, width]."""
-        values = np.zeros((len(springs.first), self.width))
-        at = self.before
-        values[:, at : at + 3] = springs.slide
+        """The numbers of these contacts as `first` has them, shape [contact, number]."""
+        twist = springs.twist * (springs.radius if self.twist_by_radius else 1.0)
+        columns = [springs.slide]
         if self.radii:
-            values[:, at + 3] = springs.radius
-        at += 3 + self.radii
+            columns.append(springs.radius[:, None])
         if self.rolling:
-            values[:, at : at + 3] = roll
-            values[:, at + 3] = springs.twist * (springs.radius if self.twist_by_radius else 1.0)
-        return values
+            columns += [roll, twist[:, None]]
+        return np.hstack(columns)
+
+    def put(self, values: Vector, at: Vector, rows: Vector) -> None:
+        """Put these histories into ``values`` from these places on. Raises LayoutError where one is there already.
+
+        But for the twisting angle, which may slide in LAMMPS' setup already.
+        """
+        twist = self.used[-1] if self.rolling else -1
+        if any(values[at + k].any() for k in range(self.before, self.width) if k != twist):
+            raise LayoutError("its contacts have a history already")
+        for k, column in zip(self.used, rows.T, strict=True):
+            values[at + k] = column
 
 
 def with_springs(
     raw: bytes, pairs: Springs, floor: Springs, *, radii: Vector, classes: RollingClasses, floor_radius: float
-) -> bytes:
+) -> bytearray:
     """A restart file of LAMMPS whose contacts have no history, with these springs.
 
     Args:
@@ -200,8 +208,9 @@ def with_springs(
     row = np.full(len(radii) + 1, -1)
     row[floor.first + 1] = np.arange(len(floor.first))
     for each in grains:
-        each.put_floor(row[each.ids], values, of_floor, more=jkr)
-    return bytes(out)
+        rows = row[each.ids]
+        of_floor.put(each.values, each.floor_at[rows >= 0] + 1, values[rows[rows >= 0]])
+    return out
 
 
 def _put_pairs(
@@ -227,7 +236,7 @@ def _put_pairs(
     if len(found) != len(expected) or (found != expected).any() or (np.diff(keys) == 0).any():
         raise LayoutError(f"its {len(found) // 2} contacts are not the bed's {len(expected) // 2}")
     for each, own in zip(grains, theirs, strict=True):
-        each.put_pairs(values[order[np.searchsorted(keys, own)]], layout)
+        layout.put(each.values, each.pair_at + 1, values[order[np.searchsorted(keys, own)]])
 
 
 class _Grains:
@@ -277,23 +286,6 @@ class _Grains:
         if (as_doubles >= 1).all():
             return as_doubles.astype(np.int64)
         return self._whole(self.pair_at)
-
-    def put_pairs(self, rows: Vector, layout: _Layout) -> None:
-        """Give the contacts these histories, shape [contact, width]."""
-        if not len(rows):
-            return
-        at = self.pair_at[:, None] + 1 + np.arange(rows.shape[1])
-        if self.values[at[:, layout.empty]].any():
-            raise LayoutError("its contacts have a history already")
-        self.values[at] = rows
-
-    def put_floor(self, row: Vector, values: Vector, layout: _Layout, *, more: int) -> None:
-        """The same with the floor; ``row``: in ``values``, -1 for none. ``more``: numbers before the history."""
-        at = self.floor_at[:, None] + 1 + np.arange(more, layout.width)
-        if self.values[at[:, [k - more for k in layout.empty]]].any():
-            raise LayoutError("its contacts with the floor have a history already")
-        touching = row >= 0
-        self.values[at[touching]] = values[row[touching], more:]
 
 
 def _only(lengths: Vector) -> int | None:
