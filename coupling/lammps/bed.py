@@ -30,6 +30,7 @@ Vector = np.ndarray
 FLOOR = 0
 STILL = 1e-5  # Mean kinetic energy of a bed at rest [m g d]
 _SPELL, _MOST_SPELLS = 1.5, 60  # How long grains are left to come to rest at a time [sqrt(d / g)], how often at most
+_FIRST = 0.5  # How long those are that kept their springs, at first [sqrt(d / g)]
 _SKIN = 0.05  # Of the neighbour lists [d]
 _SAME = 1e-9  # Relative difference of lengths that count as equal [1]
 _COLUMNS = "id x y z xu yu zu vx vy vz omegax omegay omegaz fx fy fz"
@@ -312,7 +313,7 @@ class LammpsBed:
         return self._reactions[body][:3], self._reactions[body][3:]
 
     def settle(self, tell: Callable[[float, float], None] | None = None) -> float:
-        """Let the grains come to rest with all bodies fixed; return the time that it took [s], 0 with their springs.
+        """Let the grains come to rest with all bodies fixed; return the time that it took [s], little with springs.
 
         Rest is that of a prepared bed: mean kinetic energy below 1e-5 m g d. ``tell``: called from time to time with
         the time so far [s] and the kinetic energy over that of rest [1]. Raises RuntimeError where they do not rest.
@@ -320,10 +321,9 @@ class LammpsBed:
         unit = math.sqrt(self.mean_diameter / math.hypot(*self.gravity))
         spell, began = math.ceil(_SPELL * unit / self.time_step), self.steps
         limit = STILL * self.weight * self.mean_diameter
-        if self.springs and not self.steps and self.kinetic_energy < limit:
-            return 0.0
-        for _ in range(_MOST_SPELLS):
-            self.advance(spell)
+        looks = [math.ceil(_FIRST * unit / self.time_step)] * (self.springs > 0) + [spell] * _MOST_SPELLS
+        for steps in looks:
+            self.advance(steps)
             energy = self.kinetic_energy
             if tell is not None:
                 tell((self.steps - began) * self.time_step, energy / limit)

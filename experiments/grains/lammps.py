@@ -95,9 +95,9 @@ def moved_to_lammps(
 
 
 def _springs_note(moved: Any, taken: float) -> str:
-    """What became of the springs of contacts, and the time in which the grains came to rest [s]."""
+    """What became of the springs of contacts; ``taken``: the time in which the grains came to rest [s]."""
     if moved.springs:
-        return say("springs_moving" if taken else "springs_at_rest", bed=moved, taken=taken)
+        return say("springs_kept", bed=moved, taken=taken)
     why = say("springs_fault", fault=moved.springs_fault) if moved.springs_fault else ""
     return say("springs_at_zero", taken=taken, why=why)
 
