@@ -1,7 +1,6 @@
 """A bed whose grains live in LAMMPS: what `BedGround` and the experiments use of `dem.Bed`, answered by LAMMPS.
 
-The grains begin where those of a `dem.Bed` are, with their velocities and spins. The springs of friction and rolling
-begin without stretch, since LAMMPS reads none; `settle` lets the grains come to rest again.
+The grains begin where those of a `dem.Bed` are, with velocities, spins and springs of contacts (`.springs`).
 """
 
 import math
@@ -22,6 +21,7 @@ from .law import WALL_TRIAL, MeanContact, kinetic_energy, law_words, spring_ener
 from .process import Lammps, cohesion_fault
 from .regions import MovingBody, check_count, check_thickness, pieces_of
 from .rolling import RollingClasses
+from .springs import LayoutError, springs_of, with_springs
 from .words import box_of, data_file, digits, spheres
 
 __all__ = ["LammpsBed"]
@@ -30,6 +30,7 @@ Vector = np.ndarray
 FLOOR = 0
 STILL = 1e-5  # Mean kinetic energy of a bed at rest [m g d]
 _SPELL, _MOST_SPELLS = 1.5, 60  # How long grains are left to come to rest at a time [sqrt(d / g)], how often at most
+_FIRST = 0.5  # How long those are that kept their springs, at first [sqrt(d / g)]
 _SKIN = 0.05  # Of the neighbour lists [d]
 _SAME = 1e-9  # Relative difference of lengths that count as equal [1]
 _COLUMNS = "id x y z xu yu zu vx vy vz omegax omegay omegaz fx fy fz"
@@ -39,6 +40,7 @@ class LammpsBed:
     """The grains of ``bed`` in LAMMPS on ``ranks`` processes, over the same floor, periodic in x and y.
 
     ``begin``: where LAMMPS' box begins along x [m]. A body does not reach across its ends.
+    ``springs``: the number of contacts whose springs went over [1], and ``springs_fault`` why none did.
 
     Raises ValueError, naming it, for what has no counterpart: bodies that are already in the bed, a restitution below
     LAMMPS' dashpot, a cohesion that this LAMMPS refuses. Raises LammpsMissingError where LAMMPS cannot be started.
@@ -80,6 +82,7 @@ class LammpsBed:
         self._lammps = Lammps(ranks)
         self._wears = self._wears_out()
         self._begin_anew(grains)
+        self.springs, self.springs_fault = self._take_springs(bed)
         self._origin = self._dumped()[:, 4:7]
 
     def __repr__(self) -> str:
@@ -97,9 +100,24 @@ class LammpsBed:
         box = box_of(*self.size[:2], self.height + deepest, low=(self.begin, 0.0, -deepest))
         atoms = spheres(self.radius, places, self.material.density, types=self._classes.of(self._loads(grains)))
         moving = [digits(row) for row in np.hstack([grains.velocity, grains.spin])]
-        text = data_file(box, atoms, moving, types=self._classes.count)
+        cells = np.floor(places / self.mean_diameter)  # neighbours lie near one another in memory, too
+        text = data_file(box, atoms, moving, types=self._classes.count, order=np.lexsort(cells.T))
         (self._lammps.folder / "grains.data").write_text(text, encoding="ascii")
         self._lammps.tell([*self._head(), "read_data grains.data", *self._interactions()])
+
+    def _take_springs(self, bed: Bed) -> tuple[int, str]:
+        """Give the contacts in LAMMPS the springs of those in ``bed``; `springs` and `springs_fault`."""
+        both = springs_of(bed, (self._grain_row, self._rows[FLOOR]))
+        if not (stretched := sum(each.stretched for each in both)):
+            return 0, ""
+        self._prepare()  # LAMMPS finds its contacts
+        raw, of_floor = self._lammps.kept(), self._mean.radius
+        try:
+            kept = with_springs(raw, *both, radii=self.radius, classes=self._classes, floor_radius=of_floor)
+            self._begin_from(kept)
+        except LayoutError as fault:
+            return 0, str(fault)
+        return stretched, ""
 
     def _wears_out(self) -> bool:
         """Whether a second setup changes the dashpots of walls (`coupling.lammps.law`)."""
@@ -111,9 +129,11 @@ class LammpsBed:
         return abs(after[0] - before[0]) > _SAME * abs(before[0])
 
     def _head(self) -> list[str]:
+        # Where two grains change places in memory, LAMMPS turns the springs of rolling and twisting round, and they
+        # push: what a contact has goes to the other grain with the sign of a force. So it does not sort them.
         return [
             "echo none", "units si", "atom_style sphere", "boundary p p f", "newton off", "comm_modify vel yes",
-            "processors * * 1",
+            "processors * * 1", "atom_modify sort 0 0.0",
         ]  # fmt: skip
 
     def _interactions(self) -> list[str]:
@@ -293,7 +313,7 @@ class LammpsBed:
         return self._reactions[body][:3], self._reactions[body][3:]
 
     def settle(self, tell: Callable[[float, float], None] | None = None) -> float:
-        """Let the grains come to rest with all bodies fixed; return the time that it took [s]. Time is 0 again.
+        """Let the grains come to rest with all bodies fixed; return the time that it took [s], little with springs.
 
         Rest is that of a prepared bed: mean kinetic energy below 1e-5 m g d. ``tell``: called from time to time with
         the time so far [s] and the kinetic energy over that of rest [1]. Raises RuntimeError where they do not rest.
@@ -301,8 +321,9 @@ class LammpsBed:
         unit = math.sqrt(self.mean_diameter / math.hypot(*self.gravity))
         spell, began = math.ceil(_SPELL * unit / self.time_step), self.steps
         limit = STILL * self.weight * self.mean_diameter
-        for _ in range(_MOST_SPELLS):
-            self.advance(spell)
+        looks = [math.ceil(_FIRST * unit / self.time_step)] * (self.springs > 0) + [spell] * _MOST_SPELLS
+        for steps in looks:
+            self.advance(steps)
             energy = self.kinetic_energy
             if tell is not None:
                 tell((self.steps - began) * self.time_step, energy / limit)
@@ -436,15 +457,10 @@ class LammpsBed:
 
         The run goes on to the same motion but for rounding, since LAMMPS makes new lists in another order.
         """
-        self._lammps.tell(["write_restart kept.restart noinit"])
-        self._lammps.wait()
-        path = self._lammps.folder / "kept.restart"
-        kept = np.frombuffer(path.read_bytes(), dtype=np.uint8).copy()
-        path.unlink()
         rows = [[*body.position, *body.velocity, *body.turn, *body.spin, body.angle, *body.base.ravel(), body.made]
                 for body in self._bodies]  # fmt: skip
         return {
-            "restart": kept,
+            "restart": np.frombuffer(self._lammps.kept(), dtype=np.uint8).copy(),
             "bodies": np.array(rows, dtype=float).reshape(-1, 24),
             "numbers": np.array([self.steps, self.grain_steps, self.surface, self.packing_fraction]),
             "origin": self._origin.copy(),
@@ -457,8 +473,6 @@ class LammpsBed:
             raise ValueError("the checkpoint of this bed in LAMMPS is of an earlier version: run it anew")
         if len(rows) != len(self._bodies):
             raise ValueError(f"the state has {len(rows)} bodies, this bed has {len(self._bodies)}")
-        path = self._lammps.folder / "kept.restart"
-        path.write_bytes(np.asarray(state["restart"], dtype=np.uint8).tobytes())
         steps, grain_steps, self.surface, self.packing_fraction = (float(x) for x in np.asarray(state["numbers"]))
         self.steps, self.grain_steps = int(steps), int(grain_steps)
         self._origin = np.array(state["origin"], dtype=float)
@@ -467,12 +481,14 @@ class LammpsBed:
             commands += body.take_up(row[:-1], self.steps)
             if row[-1]:
                 commands += body.create()
-        head = [line for line in self._head() if not line.startswith(("units", "atom_style", "boundary"))]
-        self._lammps.tell(["clear", *head, f"read_restart {path.name} remap", *self._interactions(), *commands])
-        self._lammps.wait()
-        path.unlink()
-        self._sums, self._set_up, self._worn = np.zeros(0), False, False
+        self._begin_from(np.asarray(state["restart"], dtype=np.uint8).tobytes(), commands)
         self._followed = self.steps
+
+    def _begin_from(self, kept: bytes | bytearray, commands: Sequence[str] = ()) -> None:
+        """Have LAMMPS begin from these bytes, and then carry out these commands."""
+        head = (line for line in self._head() if not line.startswith(("units", "atom_style", "boundary")))
+        self._lammps.begin_from(kept, before=["clear", *head], after=[*self._interactions(), *commands])
+        self._sums, self._set_up, self._worn = np.zeros(0), False, False
 
     def close(self) -> None:
         """End LAMMPS."""

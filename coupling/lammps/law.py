@@ -39,6 +39,7 @@ __all__ = [
     "TANGENTIAL",
     "WALL_TRIAL",
     "MeanContact",
+    "contact_radius",
     "dashpot_input",
     "kinetic_energy",
     "law_words",
@@ -116,6 +117,19 @@ def law_words(row: Sequence[float], material: Material, *, tensile: bool, mean: 
     words.append("damping tsuji")
     bounded = not tensile and material.cohesion == "none"
     return " ".join([*words, *(["limit_damping"] if bounded else [])])
+
+
+def contact_radius(row: Row, cohesion: str, overlap: np.ndarray, radius: np.ndarray) -> np.ndarray:
+    """Contact radius a of touching contacts [m], shape [contact]; parameters as of `spring_force`.
+
+    With JKR the overlap may be negative. Raises ValueError where such a contact has parted.
+    """
+    two_e, pi_w = float(row[0]), float(row[-1])
+    if cohesion == "jkr" and pi_w > 0:
+        of_pair = {"surface_energy": pi_w / (2 * math.pi), "effective_young": 0.5 * two_e}
+        pairs = zip(overlap, radius, strict=True)
+        return np.array([jkr_contact(float(d), radius=float(r), **of_pair)[0] for d, r in pairs], dtype=float)
+    return np.sqrt(radius * np.maximum(overlap, 0.0))
 
 
 def spring_force(row: Row, cohesion: str, overlap: np.ndarray, radius: np.ndarray) -> np.ndarray:

@@ -32,6 +32,7 @@ _LAUNCHERS, _PROGRAMS = ("mpiexec", "mpirun"), ("lmp", "lammps")
 _NEEDED = ("granular", "wall/gran/region", "nve/sphere", "ave/time")
 _GRACE = 10.0  # For LAMMPS to end by itself [s]
 _LAST_LINES = 4
+_KEPT = "kept.restart"
 MOST_RANKS_ON_A_CORE = 4  # Two on a core cost no more than one, as measured; twice that is still allowed
 _LOG_EVERY = 2000  # Messages after which the log begins anew, so that it stays small
 _PROBE = """units si
@@ -225,6 +226,23 @@ class Lammps:
     def wait(self) -> None:
         """Wait until all commands are done. Raises LammpsEndedError where LAMMPS ends meanwhile."""
         self.ask("1.0")
+
+    def kept(self) -> bytes:
+        """Its restart file."""
+        self.tell([f"write_restart {_KEPT} noinit"])
+        self.wait()
+        path = self.folder / _KEPT
+        found = path.read_bytes()
+        path.unlink()
+        return found
+
+    def begin_from(self, kept: bytes | bytearray, *, before: Iterable[str], after: Iterable[str]) -> None:
+        """Have it read a restart file, between these commands."""
+        path = self.folder / _KEPT
+        path.write_bytes(kept)
+        self.tell([*before, f"read_restart {_KEPT} remap", *after])
+        self.wait()
+        path.unlink()
 
     def _line(self) -> str:
         text = b""

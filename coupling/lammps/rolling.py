@@ -67,8 +67,12 @@ class RollingClasses:
 
     def contact(self, one: int, other: int) -> MeanContact:
         """The contact whose rolling spring the grains of two classes have."""
-        cubes = [self._first * _STEP ** (number - 1) for number in (one, other)]
-        return MeanContact(radius=(2 * cubes[0] * cubes[1] / sum(cubes)) ** (1 / 3), mass=self.mass)
+        return MeanContact(radius=float(self.radius(one, other)), mass=self.mass)
+
+    def radius(self, one: np.ndarray | int, other: np.ndarray | int) -> np.ndarray:
+        """The contact radius of this contact, or of several [m]."""
+        cubes = [self._first * _STEP ** (np.asarray(number, dtype=float) - 1) for number in (one, other)]
+        return np.asarray((2 * cubes[0] * cubes[1] / (cubes[0] + cubes[1])) ** (1 / 3))
 
     def pairs(self, *, tensile: bool) -> list[str]:
         """The commands that give each pair of classes its law. ``tensile``: as of `law_words`."""

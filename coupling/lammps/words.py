@@ -26,9 +26,15 @@ def spheres(
     return [f"{kind} {digits((2 * radius, density, *place), figures)}" for kind, radius, place in rows]
 
 
-def data_file(box: Sequence[str], atoms: Sequence[str], velocities: Sequence[str] = (), *, types: int = 1) -> str:
-    """A data file: the box, a row of ``spheres`` for each grain, then velocity [m/s] and spin [rad/s]."""
+def data_file(
+    box: Sequence[str], atoms: Sequence[str], velocities: Sequence[str] = (), *, types: int = 1,
+    order: Iterable[int] | None = None,
+) -> str:  # fmt: skip
+    """A data file: the box, a row of ``spheres`` for each grain, then velocity [m/s] and spin [rad/s].
+
+    ``order``: of the rows of grains, whose ids are those of ``atoms``.
+    """
     lines = ["grains of hedgebed\n", f"{len(atoms)} atoms", f"{types} atom types\n", *box, "\nAtoms\n"]
-    lines += [f"{k} {row}" for k, row in enumerate(atoms, 1)]
+    lines += [f"{k + 1} {atoms[k]}" for k in (range(len(atoms)) if order is None else order)]
     lines += ["\nVelocities\n", *(f"{k} {row}" for k, row in enumerate(velocities, 1))] if velocities else []
     return "\n".join(lines) + "\n"

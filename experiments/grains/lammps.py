@@ -87,11 +87,19 @@ def moved_to_lammps(
             said = time.monotonic()
             progress.message(say("coming_to_rest", taken=taken, energy=energy))
 
-    taken = moved.settle(tell)
+    springs = _springs_note(moved, moved.settle(tell))
     progress.message(
-        say("in_lammps", bed=moved, ranks=moved.ranks, taken=taken, change=1e6 * (moved.surface - bed.surface))
+        say("in_lammps", bed=moved, ranks=moved.ranks, springs=springs, change=1e6 * (moved.surface - bed.surface))
     )
     return moved
+
+
+def _springs_note(moved: Any, taken: float) -> str:
+    """What became of the springs of contacts; ``taken``: the time in which the grains came to rest [s]."""
+    if moved.springs:
+        return say("springs_kept", bed=moved, taken=taken)
+    why = say("springs_fault", fault=moved.springs_fault) if moved.springs_fault else ""
+    return say("springs_at_zero", taken=taken, why=why)
 
 
 def in_lammps(
