@@ -169,7 +169,7 @@ def _law(first: Mapping[str, Any], fitted: str | None) -> tuple[float, float, di
     if (material := material_of_today(str(folder.settings.get("material")))) != first["surface"]:
         raise ValueError(say("other_grains", fitted=fitted, material=material, surface=first["surface"]))
     result = folder.read_result()
-    if result["status"] != "done":  # of the beds that were whole when it was stopped
+    if result.get("status") == "stopped":  # of the beds that were whole when it was stopped
         raise ValueError(f"fitted = {fitted!r} is no finished run of penetrate")
     quantities = result["quantities"]
     values, sigmas = [], {}
