@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
@@ -145,7 +145,7 @@ def _no_peak(target: Target, found: Measured, done: Simulated, best: Values) -> 
     if (over := without_peak(own)) is None:
         return {}
     figure = "cohesion" if "cohesion" in target.figure else "critical_friction_angle"
-    late = target.model_copy(update={"figure": figure})
+    late = replace(target, figure=figure)
     values = []
     for seed in dict.fromkeys(test["seed"] for test in own):
         runs = {SampleTest(test["state"], test["pressure"], seed): test for test in own if test["seed"] == seed}
