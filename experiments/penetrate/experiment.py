@@ -232,7 +232,8 @@ class _Work:
         Not where it was another failure, where modulus or step are set, or where the grains have no more.
         """
         found, settings = re.search(r"an overlap of ([0-9.e+-]+) % of a diameter went past", str(error)), self.settings
-        if found is None or settings.young is not None or settings.time_step is not None:
+        fixed = settings.bed is None and (settings.young is not None or settings.time_step is not None)
+        if found is None or fixed:  # a bed that is given has its own of both, chosen when it was made
             return False
         overlap, young = float(found[1]) / 100, self._young(seed, prepared=unit is None)
         now = replace(self.softening, young=young)
