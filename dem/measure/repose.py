@@ -213,7 +213,7 @@ def _refuse_blocked(bed: BedCore, grain: float, slot: float, plate: float, drain
         )
     raise BedFailure(
         f"grains bridge the slot of {slot:.3g} m ({slot / grain:.2g} diameters): {drained} of {bed.grain_count} "
-        f"drained, and the pit has room; slot = {1.5 * slot:.2g} m, or grains that hold together less"
+        f"drained, and the pit is not full; slot = {1.5 * slot:.2g} m, or grains of lower friction"
     )
 
 

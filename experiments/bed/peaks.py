@@ -1,7 +1,7 @@
 """Whether a sample has a peak: its largest stress ratio stands out of the fluctuations at large strain, or it does not.
 
-The largest of some thirty windows of a curve that only fluctuates lies 2 standard deviations above their mean, and in
-one sample of twenty 3 (the maximum of so many normal numbers). `LEAST_PEAK` is the latter.
+A curve that only fluctuates has some thirty windows. The largest lies 2 standard deviations above their mean, and in
+one sample of twenty 3: so does the maximum of thirty normal numbers. `LEAST_PEAK` is the latter.
 """
 
 from collections.abc import Mapping, Sequence
@@ -17,8 +17,10 @@ LEAST_PEAK = 3.0
 
 
 def peak_over_noise(smooth: NDArray[np.float64]) -> float:
-    """The largest of a curve's windowed means less the mean of their second half, over the standard deviation of that
-    half [1]; infinite where that half does not fluctuate."""
+    """How far the largest of a curve's windowed means lies above the mean of their second half [1].
+
+    In standard deviations of that half; infinite where it does not fluctuate.
+    """
     late = smooth[len(smooth) // 2 :]
     spread = float(late.std(ddof=1)) if len(late) > 1 else 0.0
     above = float(smooth.max() - late.mean())

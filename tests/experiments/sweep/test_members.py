@@ -6,10 +6,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from golden import golden
 
 from experiments.runs.folder import RunFolder
 from experiments.sweep.design import design_of
-from experiments.sweep.members import MOST_WARNINGS, ends_of, warnings_of
+from experiments.sweep.members import KIND_OF_INTERVAL, MOST_WARNINGS, ends_of, warnings_of
 from experiments.sweep.result import conclude
 from experiments.sweep.settings import SweepSettings
 from vis.report import write_report
@@ -61,10 +62,12 @@ def test_the_table_has_both_ends_of_each_interval_that_a_run_knows(swept):
         assert ends == pytest.approx([(1 - half) * stiffness, (1 + half) * stiffness], rel=1e-3)
     assert np.isnan(float(rows[2]["stiffness_N_m_low95"])) and float(rows[2]["sinkage_dem_m_high95"]) == 0.003
     shown = {row[0]: row[1:] for row in result["tables"][0]["rows"]}
-    assert shown["sinkage at rest, bed: 95 % by chance"] == ["mm", *["1.0 to 3.0"] * 3]
-    assert shown["stiffness K: 95 % by chance"][-1] == "\N{EN DASH}"
-    assert not any("error of the fit" in name for name in shown)  # no run has one
-    assert "Bars: 95 % intervals" in write_report(folder).read_text()
+    sinkage, stiffness = (
+        shown[f"{name}: {KIND_OF_INTERVAL['penetrate']}"] for name in ("sinkage at rest, bed", "stiffness K")
+    )
+    assert sinkage == ["mm", *["1.0 to 3.0"] * 3] and stiffness[-1] == "\N{EN DASH}"
+    assert not any("standard error" in name for name in shown)  # no run has one
+    assert "Bars: 95" in write_report(folder).read_text()
 
 
 def test_every_kind_of_warning_is_counted_and_shown_once(swept):
@@ -73,11 +76,7 @@ def test_every_kind_of_warning_is_counted_and_shown_once(swept):
         member(0.012, warnings=["the tip is 3.9 grains across: K is about 82 % higher", "fewer than three seeds"]),
         member(0.024, warnings=["fewer than three seeds"]),
     ])  # fmt: skip
-    assert found == [
-        "in 3 of 3 runs: fewer than three seeds",
-        "in 2 of 3 runs (numbers of the first): the tip is 3 grains across: K is about 120 % higher",
-    ]
-    assert swept[1]["warnings"] == ["in 1 of 3 runs: 3 grains across: K 120 % high"]
+    golden("sweep/warnings_of_runs", {"of three": found, "in the result": swept[1]["warnings"]})
     many = warnings_of([member(0.006, warnings=["a" * length for length in range(1, MOST_WARNINGS + 4)])])
     assert len(many) == MOST_WARNINGS + 1 and many[-1].startswith("3 more kinds")
 
