@@ -14,6 +14,7 @@ cohesion = "dmt"            # "none" if not given
 surface_energy = 0.3        # [J/m2]; with cohesion
 grain = 0.004               # the mean diameter for which surface_energy holds [m]; for every one if not given
 tangential = "displacement" # the springs of friction and rolling; "rescaled" if not given
+real_grain = 0.0003         # mean diameter of the real grains [m]: no number of a simulated grain (``real_grain_of``)
 [sources]                   # where each number comes from, in words
 friction = "..."
 ```
@@ -42,6 +43,7 @@ __all__ = [
     "material",
     "of_before",
     "read_material",
+    "real_grain_of",
 ]
 
 MATERIAL_FORMAT = "hedgebed-material/1"
@@ -206,6 +208,7 @@ def _read(path: Path) -> Material:
     if found != MATERIAL_FORMAT:
         raise ValueError(f"{path}: format = {found!r}, {MATERIAL_FORMAT!r} was expected")
     table.pop("calibration", None)
+    _real_grain(path, table.pop("real_grain", None))
     known = {one.name: one for one in fields(Material)}
     for key in table:
         if key not in known:
@@ -216,6 +219,27 @@ def _read(path: Path) -> Material:
     if missing := [key for key in needed if key not in table]:
         raise ValueError(f"{path}: {', '.join(missing)} must be given")
     return Material(**{key: _of_its_kind(path, key, value) for key, value in table.items()})
+
+
+def real_grain_of(name: str | Path) -> float | None:
+    """Mean diameter of the real grains of a material [m], where it is known: of one that ships, or as its file states.
+
+    Raises ValueError as `read_material`.
+    """
+    if (known := material_of_today(str(name).lower())) in MATERIALS:
+        return REAL_GRAINS.get(known)
+    read_material(name)
+    table = tomllib.loads(Path(name).read_text(encoding="utf-8"))
+    return _real_grain(Path(name), table.get("real_grain"))
+
+
+def _real_grain(path: Path, value: Any) -> float | None:
+    """A diameter [m], or None where none is given. Raises ValueError for what is none."""
+    if value is None:
+        return None
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < 1:
+        raise ValueError(f"{path}: real_grain = {value!r} must be a diameter in m, above 0 and below 1")
+    return float(value)
 
 
 def _of_its_kind(path: Path, key: str, value: Any) -> Any:
@@ -235,6 +259,9 @@ def _of_its_kind(path: Path, key: str, value: Any) -> Any:
 
 MATERIALS = {stuff.name: stuff for stuff in map(_read, sorted(PRESETS.glob("*.toml")))}
 """The materials that ship, those of dem/presets (docs/materials.md)."""
+
+REAL_GRAINS = {"sand": 2e-4, "sand-weak": 2e-4}
+"""Diameter of real grains [m]: 0.2 mm is where fine sand ends and medium sand begins (ISO 14688-1)."""
 
 SAND, SAND_WEAK = MATERIALS["sand"], MATERIALS["sand-weak"]
 """Fine silica sand, calibrated to its friction angle; and ``sand`` of before 2026-11-26, six degrees weaker."""

@@ -33,6 +33,7 @@ _LEAST_POINTS = 6  # of them on a slope
 _CALM, _QUIET, _LONGEST = 1e-5, 2.0, 80.0
 # Of the plate [mean diameters]; and of the pit below it, over the bed's height: what drains lies there in a heap.
 _PLATE, _PIT, _LEAST_PIT = 2.0, 1.5, 0.8
+_FULL = 3.0  # A pit is full whose heap ends less than so many mean diameters below the plate
 
 
 @dataclass(frozen=True)
@@ -192,13 +193,28 @@ def _drain(bed: BedCore, grain: float, slot: float, plate: float, height: float,
                 f"wanted, {drained} grains drained"
             )
         tell(min(0.99, time / (12 * fall)))
-    x, _, z = bed.grains().position.T
-    if ((np.abs(from_middle(x, bed.size[0])) < 0.5 * slot - grain) & (z > plate - _PLATE * grain)).any():
-        raise BedFailure(
-            f"the slot of {slot:.4g} m is blocked: grains bridge it, or the pit below it is full; a wider one, or "
-            f"grains that stick less"
-        )
+    _refuse_blocked(bed, grain, slot, plate, drained)
     return drained
+
+
+def _refuse_blocked(bed: BedCore, grain: float, slot: float, plate: float, drained: int) -> None:
+    """Raise BedFailure where grains are still in the slot: on the heap of a full pit, or as a bridge above a gap."""
+    grains = bed.grains()
+    x, _, z = grains.position.T
+    over, bottom = np.abs(from_middle(x, bed.size[0])) < 0.5 * slot - grain, plate - _PLATE * grain
+    if not (over & (z > bottom)).any():
+        return
+    heap = z[over & (z < bottom)]
+    top = float(heap.max()) if len(heap) else 0.0
+    if top > bottom - _FULL * grain:
+        raise BedFailure(
+            f"the pit below the plate, {bottom:.3g} m deep, is full of the {drained} grains that drained: the slope "
+            f"cannot end; a shallower or a narrower bed"
+        )
+    raise BedFailure(
+        f"grains bridge the slot of {slot:.3g} m ({slot / grain:.2g} diameters): {drained} of {bed.grain_count} "
+        f"drained, and the pit is not full; slot = {1.5 * slot:.2g} m, or grains of lower friction"
+    )
 
 
 def from_middle(x: np.ndarray, period: float) -> np.ndarray:

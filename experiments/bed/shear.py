@@ -26,6 +26,7 @@ from experiments.runs.result import Result, quantity
 from experiments.runs.types import Json
 from experiments.runs.whole_runs import computed_run
 
+from .peaks import LEAST_PEAK, peak_over_noise, without_peak
 from .settings import say
 from .test_settings import BedShearSettings
 from .tests import picked, table
@@ -52,6 +53,8 @@ class Strength:
     critical: float
     critical_error: float
     peak_way: float
+    peak_over_noise: float
+    """Of the peak, as `peaks.peak_over_noise` has it [1]."""
 
 
 def strength_of(run: Shearing, grain: float) -> Strength:
@@ -73,6 +76,7 @@ def strength_of(run: Shearing, grain: float) -> Strength:
         critical=normal * float(np.mean(parts)),
         critical_error=normal * float(np.std(parts, ddof=1)) / math.sqrt(_PARTS),
         peak_way=float(run.way[min(top + count // 2, len(run.way) - 1)]),
+        peak_over_noise=peak_over_noise(smooth),
     )
 
 
@@ -159,12 +163,16 @@ def _result(settings: BedShearSettings, runs: list[Shearing], grain: float, reci
         warnings.append(say("small_shear", long=long, wide=wide, deep=deep))
     if len(runs) < 3:
         warnings.append("fewer than three pressures: the line through them has no error that could be stated")
+    quantities = _strengths(strengths, _BAND * grain / bed.surface, runs[0])
+    if (over := without_peak([{"peak_over_noise": one.peak_over_noise} for one in strengths])) is not None:
+        peak, late = (math.degrees(math.atan(quantities[f"{kind}_ratio"]["value"])) for kind in ("peak", "critical"))
+        warnings.append(say("no_peak", over=over, least=LEAST_PEAK, excess=peak - late))
     if doubt := caveat(bed.material):
         warnings.append(doubt)
     return Result.make(
         "bed test shear",
         title=f"{settings.bed}: sheared under a lid",
-        quantities=_strengths(strengths, _BAND * grain / bed.surface, runs[0]),
+        quantities=quantities,
         tables=[table("Run by run", zip(strengths, runs, strict=True), columns)],
         runs=[
             {"id": f"shear-{pressure:g}", "series": f"series/shear-{pressure:g}.csv"}

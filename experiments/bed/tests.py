@@ -19,6 +19,7 @@ from dem.prepare.prepare import bound_of_mean, check_options
 from experiments.grains.bed_progress import BedProgress
 from experiments.grains.kept_material import keep_material
 from experiments.penetrate.fit import spread
+from experiments.penetrate.given import material_of_bed
 from experiments.runs.folder import RunFolder, write_text
 from experiments.runs.progress import Progress
 from experiments.runs.result import Result
@@ -53,6 +54,8 @@ def check_bed(settings: BedTestSettings) -> Extent:
         return Extent(settings.size, settings.size[2], settings.grain)
     path = find_bed(settings.bed)
     stored, state, _ = read_file(path)
+    if settings.material != type(settings).model_fields["material"].default:
+        material_of_bed(settings.bed, stored.material, settings.material)
     reports = read_preparation(path).reports
     stages = [report.stage for report in reports]
     if stored.gravity[0] or stored.gravity[1] or any(stage.startswith("cut") for stage in stages):

@@ -2,19 +2,22 @@
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
 from dem.grains.materials import MATERIAL_FORMAT, MATERIALS, Material
+from experiments.bed.peaks import LEAST_PEAK, without_peak
 from experiments.bed.tests import picked, table
 from experiments.runs.folder import RunFolder, toml_value
 from experiments.runs.result import Result, quantity
 from experiments.runs.types import Json
 from experiments.runs.version import __version__
+from rigid.intervals import half_of
 
 from .fit import Fit, Surfaces
 from .settings import FREE, CalibrateSettings, Target, say
+from .tests import SampleTest, figures_of
 
 __all__ = ["Simulated", "calibration_result", "material_toml"]
 
@@ -57,14 +60,21 @@ def calibration_result(
         note = f"for grains of {settings.grain:g} m"
         quantities["surface_energy"] = quantity(stuff.surface_energy, "J/m2", note, std=None)
     reach = _reach(responses)
-    entries = [_entry(target, measured[target.name], fit, reach.get(target.name)) for target in targets]
+    freedom = len(settings.check_seeds) - 1
+    entries = [
+        _entry(target, measured[target.name], fit, reach.get(target.name), freedom)
+        | _no_peak(target, measured[target.name], done, best)
+        for target in targets
+    ]
     warnings = _warnings(settings, fit)
     for target, entry in zip(targets, entries, strict=True):
         got, error, verdict = entry["measured"], entry["error"], entry["verdict"]
         note = f"{verdict}; wanted {target.value:g} ± {target.tolerance:g}"
-        quantities[target.name] = quantity(got, target.unit, note, std=error)
+        quantities[target.name] = quantity(got, target.unit, note, std=error) | _freedom(entry)
         if verdict != "met":
             warnings.append(_unmet(target, entry))
+        if entry.get("no_peak"):
+            warnings.append(say("no_peak", name=target.name, least=LEAST_PEAK, **entry["no_peak"]))
     if settings.name in MATERIALS and MATERIALS[settings.name] != stuff:
         warnings.append(say("name_ships_otherwise", s=settings))
     over = max((test["max_overlap"] for test in done.tests), default=0.0)
@@ -87,13 +97,20 @@ def calibration_result(
     )
 
 
-def _entry(target: Target, found: Measured, fit: Fit, reach: tuple[float, float] | None) -> Json:
-    """The result's entry of one figure: wanted, measured, and what the response surface expects."""
+def _entry(target: Target, found: Measured, fit: Fit, reach: tuple[float, float] | None, freedom: int) -> Json:
+    """The result's entry of one figure: wanted, measured, and what the response surface expects.
+
+    ``freedom``: degrees of freedom of the error, of several samples.
+    """
     got, error = found if found is not None else (None, None)
+    known: Json = {"error": error, **({"freedom": freedom} if error is not None and freedom > 0 else {})}
+    half = _half(known) or 0.0
     off = math.inf if got is None else abs(got - target.value)
-    verdict = "met within the tests' noise" if off <= target.tolerance + 2 * (error or 0.0) else "not met"
-    if got is None or off <= target.tolerance:
-        verdict = "not measured" if got is None else "met"
+    verdict = "met" if off <= target.tolerance else "not met"
+    if got is None:
+        verdict = "not measured"
+    elif target.tolerance < off <= target.tolerance + half:
+        verdict = "not met; the tests' noise does not exclude it"
     return {
         **picked(target, "name", "figure", "unit"),
         "wanted": target.value,
@@ -102,7 +119,7 @@ def _entry(target: Target, found: Measured, fit: Fit, reach: tuple[float, float]
         "state": target.state or None,
         "fitted": target.fit,
         "measured": got,
-        "error": error,
+        **known,
         "expected": fit.response.get(target.name),
         "expected_std": fit.response_std.get(target.name),
         "reach": reach,
@@ -110,13 +127,44 @@ def _entry(target: Target, found: Measured, fit: Fit, reach: tuple[float, float]
     }
 
 
+def _freedom(entry: Json) -> Json:
+    """The degrees of freedom of a figure's error, where they are known."""
+    return {"freedom": entry["freedom"]} if "freedom" in entry else {}
+
+
+def _no_peak(target: Target, found: Measured, done: Simulated, best: Values) -> Json:
+    """The entry "no_peak" of a peak strength that is a maximum of fluctuations; nothing where there is a peak.
+
+    "over": the largest strength less that at large strain, in standard deviations of the fluctuations. "critical": what
+    the same tests have at large strain. "excess": the largest less that.
+    """
+    if not target.figure.startswith("peak") or found is None:
+        return {}
+    checks = [test for test in done.tests if test["test"].startswith("check") and test["values"] == best]
+    own = [test for test in checks if test["state"] == target.state]
+    if (over := without_peak(own)) is None:
+        return {}
+    figure = "cohesion" if "cohesion" in target.figure else "critical_friction_angle"
+    late = replace(target, figure=figure)
+    values = []
+    for seed in dict.fromkeys(test["seed"] for test in own):
+        runs = {SampleTest(test["state"], test["pressure"], seed): test for test in own if test["seed"] == seed}
+        values.append(figures_of([late], runs)[target.name][0])
+    critical = float(np.mean(values))
+    return {
+        "no_peak": {"over": over, "critical": critical, "excess": found[0] - critical, "unit": target.unit,
+                    "instead": figure},
+    }  # fmt: skip
+
+
 def _unmet(target: Target, entry: Json) -> str:
-    value, error, verdict, reach = (entry[key] for key in ("measured", "error", "verdict", "reach"))
+    value, verdict, reach = (entry[key] for key in ("measured", "verdict", "reach"))
+    half = _half(entry)
     wanted = f"{target.value:g} ± {target.tolerance:g} {target.unit} was wanted"
     if value is None:
         return f"{target.name} could not be measured: {wanted}"
-    said = f"{target.name} = {value:.3g}{'' if error is None else f' ± {error:.2g}'} where {wanted}: {verdict}"
-    if reach is not None and verdict == "not met" and not reach[0] <= target.value <= reach[1]:
+    said = f"{target.name} = {value:.4g}{'' if half is None else f' ± {half:.2g} (95 %)'} where {wanted}: {verdict}"
+    if reach is not None and verdict.startswith("not met") and not reach[0] <= target.value <= reach[1]:
         said += f"; within the parameters' ranges it goes from {reach[0]:.3g} to {reach[1]:.3g}"
     return said
 
@@ -181,15 +229,21 @@ def _curves(settings: CalibrateSettings, responses: Surfaces, best: Values, fold
     return files
 
 
+def _half(entry: Json) -> float | None:
+    """Half of the 95 % interval of a figure's entry."""
+    return half_of({"std": entry["error"], **_freedom(entry)})
+
+
 def _simulated(entry: Json) -> str:
-    error = "" if entry["error"] is None else f" ± {entry['error']:.2g}"
+    half = _half(entry)
+    error = "" if half is None else f" ± {half:.2g}"
     return "-" if entry["measured"] is None else f"{entry['measured']:.4g}{error}"
 
 
 _FIGURES: dict[str, Callable[[Json], str]] = {
     "figure": lambda entry: entry["name"] + (f" ({entry['plane']})" if entry["plane"] not in (None, "shear") else ""),
     "wanted": lambda entry: f"{entry['wanted']:g} ± {entry['tolerance']:g} {entry['unit']}",
-    "simulated": _simulated,
+    "simulated (95 %)": _simulated,
     "surface": lambda entry: (
         "-" if entry["expected"] is None else f"{entry['expected']:.4g} ± {entry['expected_std']:.2g}"
     ),
@@ -231,6 +285,9 @@ def material_toml(stuff: Material, settings: CalibrateSettings, fit: Fit, figure
         digits = {"measured": ".5g", "error": ".2g"}
         rounded = {key: None if entry[key] is None else float(f"{entry[key]:{form}}") for key, form in digits.items()}
         found = {key: (entry | rounded)[key] for key in ("wanted", "tolerance", *digits, "verdict", "source")}
+        if "no_peak" in entry:
+            excess = f"{entry['no_peak']['excess']:.2g} {entry['unit']}"
+            found["peak"] = f"none beyond fluctuations, which add {excess} to the value at large strain"
         lines += ["", f"[calibration.{entry['name']}]", *_pairs(found)]
     return "\n".join(lines) + "\n"
 

@@ -28,6 +28,7 @@ from dem.grains.materials import Material
 from dem.measure.cutting import MOST, cut_and_load
 from dem.measure.element import ElementShear, shear_element
 from dem.measure.repose import angle_of_repose
+from experiments.bed.peaks import peak_over_noise
 from experiments.bed.repose import BEARING
 from experiments.bed.tests import picked, stiff_enough
 from experiments.runs.types import Json
@@ -197,6 +198,7 @@ def summary_of(run: ElementShear, density: float) -> Json:
         "peak_normal": float(run.normal[top : top + count].mean()),
         "peak_shear": float(run.normal[top : top + count].mean() * smooth[top]),
         "peak_strain": float(run.strain[top + count // 2]),
+        "peak_over_noise": min(peak_over_noise(smooth), 1e6),
         "tensor": run.stress[late].mean(axis=0).tolist(),
         "peak_tensor": run.stress[at_peak].mean(axis=0).tolist(),
         "bulk_density": run.packing_before * density,

@@ -26,14 +26,17 @@ def render(
     json: Annotated[bool, Parameter(help="Print the files that were drawn as JSON on stdout.", negative="")] = False,
     quiet: Annotated[bool, Parameter(help="Show no progress.", negative="")] = False,
 ) -> int:
-    """Draw pictures, film and report of a finished run again."""
+    """Draw pictures, film and report of a finished run again; of a stopped penetrate run those of its whole beds."""
     from vis.pictures.frames import check_frames
 
     with refusing():
         folder = RunFolder.open(run)
+        if folder.command == "penetrate" and folder.status not in ("done", None):
+            _conclude_stopped(folder)
         if not (run / "result.json").exists():
+            whole = " (no bed is whole)" if folder.command == "penetrate" else ""
             raise ValueError(
-                f"run = {str(run)!r} has no result yet: `hedgebed resume {run}` finishes it where it can be"
+                f"run = {str(run)!r} has no result yet{whole}: `hedgebed resume {run}` finishes it where it can be"
             )
         folder.read_result()
         check_frames(run)
@@ -70,6 +73,18 @@ def render(
             print(path)
         print(f"report: {report}")
     return 0
+
+
+def _conclude_stopped(folder: RunFolder) -> None:
+    """Write the result of the beds that are whole, of a run of penetrate that was stopped, failed or killed."""
+    from experiments.penetrate.settings import say as words
+    from experiments.penetrate.whole_beds import result_of_whole_beds
+
+    with folder.lock(), stdout_to_stderr(), make_progress(quiet=True) as progress:
+        result = result_of_whole_beds(folder, progress)
+    if result is not None:
+        whole = len({entry["seed"] for entry in result["runs"]})
+        say(f"warning: {words('whole_beds', count=whole, of=len(folder.settings['seeds']))}")
 
 
 def _now(folder: RunFolder) -> float:

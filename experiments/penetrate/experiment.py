@@ -29,7 +29,7 @@ from experiments.runs.progress import Progress
 from experiments.runs.result import Result
 from experiments.runs.stopping import held_back
 from experiments.runs.types import Json
-from experiments.runs.whole_runs import PictureCosts, draw_report, whole_run
+from experiments.runs.whole_runs import PictureCosts, draw_plots, draw_report, whole_run
 from rigid.checks.unfit import UnfitSettingsError, failed_as
 
 from . import beds
@@ -43,6 +43,7 @@ from .result import conclude, softening_note, staged_note, stiffer_note
 from .settings import PenetrateSettings, say
 from .similarity import fast_for_gravity, similarity_of
 from .units import PenetratePlan, Unit, expected_time, make_run, make_spike, plan_units, share_done, shown_units
+from .whole_beds import keep_whole_beds, missing_beds, missing_name
 
 __all__ = ["Frames", "check", "compute", "fingerprint", "resume", "run"]
 
@@ -61,14 +62,26 @@ def _carry_out(settings: PenetrateSettings, folder: RunFolder, progress: Progres
     if not settings.on_grains:
         return run_on_law(settings, folder, progress)
     with folder.lock():
-        result = compute(settings, folder, progress)
+        try:
+            result = compute(settings, folder, progress)
+        except KeyboardInterrupt:
+            if _stopped_with_result(folder):
+                draw_plots(folder, progress)
+                progress.message(say("stopped_report", report=folder.path / "report.html", folder=folder.path))
+            raise
         draw_report(folder, progress, _picture_costs(folder.path, result))
     return result
+
+
+def _stopped_with_result(folder: RunFolder) -> bool:
+    """Whether the folder has the result of the beds that were whole when the run was stopped."""
+    return (folder.path / "result.json").exists() and folder.read_result()["status"] == "stopped"
 
 
 def compute(settings: PenetrateSettings, folder: RunFolder, progress: Progress) -> Result:
     """All runs on beds that are not finished yet, and the result in the folder, without a report.
 
+    Where it is stopped, the result is that of the beds that are whole (`keep_whole_beds`), if any is.
     Raises RuntimeError where a bed cannot be prepared or a run cannot go on.
     """
     settings = settings.model_copy(update={"material": keep_material(settings.material, folder.path)})
@@ -96,8 +109,12 @@ def compute(settings: PenetrateSettings, folder: RunFolder, progress: Progress) 
         for text in resolution_advice(**beds.resolution_of(settings), seconds=plan.seconds or None):
             progress.message(text)
         work = _Work(settings, units, softening, folder, progress, plan)
-        for seed in settings.seeds:
-            work.run_seed(seed)
+        try:
+            for seed in settings.seeds:
+                work.run_seed(seed)
+        except KeyboardInterrupt:
+            keep_whole_beds(settings, folder, progress)
+            raise
         result = conclude(settings, work.units, softening, folder, progress, missing=work.missing)
         folder.write_result(result)
         if settings.campaign is not None:
@@ -132,8 +149,7 @@ class _Work:
     @property
     def missing(self) -> dict[int, str]:
         """Seed -> why its bed could not be prepared, of those so far."""
-        notes = {seed: self.folder.noted(_missing(seed), None) for seed in self.settings.seeds}
-        return {seed: str(note) for seed, note in notes.items() if note is not None}
+        return missing_beds(self.settings, self.folder)
 
     @property
     def units(self) -> list[Unit]:
@@ -158,7 +174,7 @@ class _Work:
             missing[seed] = str(error)
             if len(missing) == len(self.settings.seeds):  # the last one is tried again when the run is resumed
                 raise failed_as(error, "; ".join(missing.values())) from error
-            self.folder.mark_done(_missing(seed), str(error))
+            self.folder.mark_done(missing_name(seed), str(error))
             self.progress.message(f"warning: {say('bed_missing', why=error)}")
             return
         self.plan.bed_is_there()
@@ -216,7 +232,8 @@ class _Work:
         Not where it was another failure, where modulus or step are set, or where the grains have no more.
         """
         found, settings = re.search(r"an overlap of ([0-9.e+-]+) % of a diameter went past", str(error)), self.settings
-        if found is None or settings.young is not None or settings.time_step is not None:
+        fixed = settings.bed is None and (settings.young is not None or settings.time_step is not None)
+        if found is None or fixed:  # a bed that is given has its own of both, chosen when it was made
             return False
         overlap, young = float(found[1]) / 100, self._young(seed, prepared=unit is None)
         now = replace(self.softening, young=young)
@@ -287,11 +304,6 @@ class _Work:
         folder.mark_done(unit.id, series.facts() | kept_of_bed)
         folder.drop_checkpoint(unit.id)
         return True
-
-
-def _missing(seed: int) -> str:
-    """The name under which a folder keeps why the bed of a seed could not be prepared."""
-    return f"missing-{seed}"
 
 
 def _remedy(error: RuntimeError) -> str:

@@ -18,6 +18,7 @@ from .following import following, pace, sticking_of
 __all__ = [
     "drops_nothing",
     "further_speeds",
+    "material_of_bed",
     "settings_of_bed",
     "settings_of_gravity",
     "settings_of_ground",
@@ -58,7 +59,6 @@ def settings_of_bed(given: Json) -> Json:
     Raises ValueError for no bed, one that is tilted or cut, an unknown material, and where `given` contradicts it.
     """
     from dem.engine.state import read_file
-    from dem.grains.materials import MATERIALS, material
     from dem.prepare.bedfile import find_bed, read_preparation
 
     name = str(given["bed"])
@@ -71,17 +71,9 @@ def settings_of_bed(given: Json) -> Json:
     stuff = settings.material
     radii = state["position"][:, 3].astype(float)
     grain = _plain(2 * radii.mean())
-    known = material(given["material"]) if "material" in given else MATERIALS.get(stuff.name)
-    kept = preparation.recipe.get("material", {}).get("grain")  # the size for which the bed was prepared
-    if known is not None and kept is not None:
-        known = known.for_grain(kept)
-    if known is None or known.softened(stuff.young) != stuff:
-        whose = f"one that ships ({', '.join(sorted(MATERIALS))}): give --material with the file that it was made with"
-        if "material" in given:
-            whose = f"material = {given['material']!r}: use the file that the bed was made with"
-        raise ValueError(f"bed = {name!r} is of a material {stuff.name!r} whose numbers are not those of {whose}")
+    own = material_of_bed(name, stuff, given.get("material"))
     said = {
-        "material": given.get("material", stuff.name),
+        "material": own,
         "bed_size": settings.size,
         "grain": grain,
         "spread": min(0.5, _plain((radii.max() - radii.min()) / (radii.max() + radii.min()))),
@@ -94,10 +86,36 @@ def settings_of_bed(given: Json) -> Json:
         "precision": precision,
     }
     for key, value in said.items():
-        if key in given and not _same(given[key], value):
+        if key != "material" and key in given and not _same(given[key], value):
             both = f"{key} = {given[key]!r} beside bed = {name!r}"
             raise ValueError(f"{both}, whose own is {value!r}: leave {key} out, or the bed")
     return given | said
+
+
+def material_of_bed(bed: str, stuff: Any, asked: str | None) -> str:
+    """Name or file of the material of a bed, whose grains are of ``stuff``.
+
+    It is the one asked for, else one that ships, else the copy in the folder of the run that made the bed.
+    A bed sets its material: one that is asked for must be the same. Raises ValueError where it is not, for one that
+    cannot be read, and where none is found.
+    """
+    from dem.grains.materials import MATERIALS, material
+    from dem.prepare.bedfile import find_bed, read_preparation
+
+    path = find_bed(bed)
+    kept = read_preparation(path).recipe.get("material", {}).get("grain")  # the size for which the bed was prepared
+    copy = path.parent / "material.toml"
+    names = [asked] if asked is not None else [stuff.name] if stuff.name in MATERIALS else []
+    names += [str(copy)] if asked is None and copy.is_file() else []
+    for name in names:
+        known = material(name) if kept is None else material(name).for_grain(kept)
+        if known.softened(stuff.young) == stuff:
+            return name
+    if asked is not None:
+        other = f"material = {asked!r}: leave material out, or use the file that the bed was made with"
+    else:
+        other = f"one that ships ({', '.join(sorted(MATERIALS))}): give --material with the file that it was made with"
+    raise ValueError(f"bed = {bed!r} is of a material {stuff.name!r} whose numbers are not those of {other}")
 
 
 def settings_of_gravity(given: Json, fields: Mapping[str, FieldInfo]) -> Json:

@@ -11,9 +11,10 @@ power law fitted to a drive is no alternative. A flat tip is carried at depth 0 
 import math
 from collections.abc import Sequence
 from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 
-from dem.grains.materials import MATERIALS
+from dem.grains.materials import MATERIALS, REAL_GRAINS, real_grain_of
 from experiments.grains.bearing import (
     COHESIONS,
     UNSURE,
@@ -27,7 +28,6 @@ from experiments.grains.bearing import (
 )
 from experiments.runs.types import Json
 from rigid.platform.rig import STANDARD_GRAVITY
-from vis.penetrate.summary import REAL_GRAINS
 from vis.penetrate.summary_parts import joined
 
 from . import beds
@@ -166,12 +166,19 @@ def _by_cohesion(settings: PenetrateSettings, material: Any) -> tuple[Json, Json
     return numbers, told | {"branches": say("branches", **told)}
 
 
+def _real_grain(settings: PenetrateSettings, material: Any) -> float:
+    """Mean diameter of the real grains [m]; 0 where the material does not state it, which makes errors wider."""
+    if material.name in REAL_GRAINS:
+        return REAL_GRAINS[material.name]
+    return (real_grain_of(settings.material) if Path(settings.material).is_file() else None) or 0.0
+
+
 def sinkage_interval(findings: Findings, material: Any) -> Interval | None:
     """How sure the depth at rest is; None where no set-down came to rest."""
     settings = findings.settings
     return interval_of_sinkage(
         findings.sinkages(findings.beds), tip=settings.tip, grain=settings.grain,
-        real=REAL_GRAINS.get(material.name, 0.0), cohesive=material.cohesion != "none",
+        real=_real_grain(settings, material), cohesive=material.cohesion != "none",
     )  # fmt: skip
 
 
@@ -184,7 +191,7 @@ def how_sure(findings: Findings, material: Any, rest: Json | None) -> Json:
     beds_k = [fit.stiffness for fit in findings.seed_fits.values()] if findings.beds_separate else []
     stiffness = None if not findings.fit.separates else interval_of_stiffness(
         findings.fit.stiffness, beds_k, tip=settings.tip,
-        grain=settings.grain, real=REAL_GRAINS.get(material.name, 0.0), diameter=settings.tip_diameter,
+        grain=settings.grain, real=_real_grain(settings, material), diameter=settings.tip_diameter,
         cohesive=material.cohesion != "none",
     )  # fmt: skip
     found = {

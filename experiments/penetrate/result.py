@@ -45,10 +45,12 @@ def conclude(
     progress: Progress,
     *,
     missing: Mapping[int, str],
+    stopped_of: int = 0,
 ) -> Result:
     """Fit, make the same runs on the law, compare; write the law's series; return the result.
 
-    ``missing``: seed -> why its bed could not be prepared; ``units`` has no runs of it.
+    ``missing``: seed -> why its bed could not be prepared; ``units`` has no runs of it. ``stopped_of``: of how many
+    beds these are the whole ones, where the run was stopped.
     """
     progress.stage("spring-damper", total=1.0)
     notes = {unit.id: folder.done_data(unit.id) for unit in units}
@@ -81,7 +83,8 @@ def conclude(
         cone_note(settings),
         *(text for text in doubts if doubts[text]),
     ]
-    warnings = [*warnings_of(findings), *filter(None, found)]
+    part = [say("whole_beds", count=len(facts), of=stopped_of)] if stopped_of else []
+    warnings = [*part, *warnings_of(findings), *filter(None, found)]
     departures = departures_in_words(findings)
     entries = findings.run_entries(notes)
     law = kept_law(settings, folder.path)
@@ -96,7 +99,7 @@ def conclude(
     result: Json = {
         "code": codes.pop() if len(codes) == 1 else beds.fingerprint(),
         "title": f"A {settings.body_words} in {material.name}",
-        "status": "done",
+        "status": "stopped" if stopped_of else "done",
         "quantities": quantities,
         "runs": entries,
         "fits": findings.fit_entries(),

@@ -240,7 +240,10 @@ class PenetrateSettings(StrictSettings):
         # A drop or a set-down is ended one tip's diameter above the floor.
         reach = max(self.depth, self.bed_size[2] - self.tip_diameter)
         if self.foot < reach * (1 - 1e-9):
-            return say("shaft_short", s=self, reach=reach, least=reach - self.tip_height)
+            what = "drop" if self.drop_speeds or (len(self.seeds) > 1 and self.other_drop_speeds) else "set_down"
+            return say(
+                "shaft_short", s=self, what=say(f"reached_by_{what}"), reach=reach, least=reach - self.tip_height
+            )
         return None
 
     def _bed(self) -> str | None:

@@ -15,8 +15,8 @@ from .progress import Progress
 from .result import Result
 
 __all__ = [
-    "PictureCosts", "computed_run", "draw_report", "keeping_status", "publish", "whole_run", "without_reports",
-    "write_report",
+    "PictureCosts", "computed_run", "draw_plots", "draw_report", "keeping_status", "publish", "whole_run",
+    "without_reports", "write_report",
 ]  # fmt: skip
 
 # What the report of `penetrate` takes with OpenGL in software on two cores [s], by the files' times of two runs, of
@@ -129,6 +129,15 @@ def draw_report(folder: RunFolder, progress: Progress, *costs: PictureCosts) -> 
         return
     progress.stage("report", total=1.0)
     write_report(folder.path, progress, *costs)
+
+
+def draw_plots(folder: RunFolder, progress: Progress) -> None:
+    """The report of a run that was stopped, without pictures of grains: it is waited for; none `without_reports`."""
+    from vis.report import write_report as write
+
+    if _DRAWN.get():
+        progress.stage("report", total=1.0)
+        write(folder.path, pictures=False, progress=progress.update)
 
 
 def computed_run(

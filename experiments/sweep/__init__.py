@@ -3,7 +3,7 @@
 `Settings`, `check`, `run` and `resume` are those of `hedgebed sweep`; calling one imports what computes.
 
 Imports `experiments.converge`, `experiments.penetrate`, `experiments.pool`, `experiments.runs`, `experiments.suite`,
-`experiments.tumble`, `rigid`, `vis.page`.
+`experiments.tumble`, `rigid`, `vis.page`, `vis.penetrate`.
 """
 
 from experiments.runs.registry import face

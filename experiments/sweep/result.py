@@ -11,7 +11,7 @@ import json
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,7 @@ from vis.page.sentences import label_of
 
 from .design import Design, problem_of
 from .factors import unit_of, words_of
+from .members import KIND_OF_INTERVAL, ends_of, warnings_of
 from .settings import SweepSettings
 
 __all__ = ["FEWEST_SAMPLES", "conclude", "shared_title"]
@@ -37,6 +38,8 @@ FEW = 8
 """Runs up to which each has a column in the table that is shown [1]."""
 _INDICES = {"first": "S1", "first_conf": "S1_conf", "total": "ST", "total_conf": "ST_conf"}
 """Names in result.json -> those of SALib."""
+ENDS = ("_low95", "_high95")
+"""What the names of both ends of a 95 % interval have at their end, in table.csv and table.nc."""
 Array = NDArray[np.float64]
 
 
@@ -48,6 +51,18 @@ class _Column:
     unit: str
     values: Array
     stds: Array
+    ends: Array = field(default_factory=lambda: np.empty((0, 2)))
+    """Of 95 % intervals, shape [runs, 2]; NaN where a run does not know its own."""
+
+    @property
+    def there(self) -> bool:
+        """Whether any run has it."""
+        return bool(np.isfinite(self.values).any())
+
+    @property
+    def has_ends(self) -> bool:
+        """Whether any run knows its 95 % interval."""
+        return bool(np.isfinite(self.ends).any())
 
     @property
     def head(self) -> str:
@@ -82,6 +97,7 @@ def conclude(
     failed = sum(bool(fault) for fault in faults)
     if failed:
         warnings.append(f"{failed} of {len(tasks)} runs failed: table.csv says why, and plots leave them out")
+    warnings += warnings_of([json.loads(outcomes[task.name].result) for task in tasks if outcomes[task.name].result])
     own = design.experiment.settings_class()
     title = f"{len(tasks)} runs of {settings.experiment} over {', '.join(words_of(key, own) for key in design.keys)}"
     return Result.make(
@@ -93,7 +109,9 @@ def conclude(
             {"key": key, "unit": unit_of(key, own), "words": words_of(key, own)} for key in design.keys
         ],
         columns=[
-            {"name": one.name, "unit": one.unit, "head": one.head, "words": label_of(one.name)} for one in drawn
+            {"name": one.name, "unit": one.unit, "head": one.head, "words": label_of(one.name),
+             **({"ends": [f"{one.head}{end}" for end in ENDS]} if one.has_ends else {})}
+            for one in drawn
         ],
         sensitivities=sensitive, warnings=warnings,
     )  # fmt: skip
@@ -115,14 +133,19 @@ def shared_title(results: Iterable[str]) -> str:
 
 def _columns(tasks: Sequence[Task], outcomes: Mapping[str, Outcome]) -> list[_Column]:
     """Every quantity of the runs, in the order in which they are met."""
-    found = [json.loads(outcomes[task.name].result or "{}").get("quantities", {}) for task in tasks]
+    results = [json.loads(outcomes[task.name].result or "{}") for task in tasks]
+    found, known = [one.get("quantities", {}) for one in results], [ends_of(one) for one in results]
     units = {name: str(entry["unit"]) for entries in found for name, entry in entries.items()}
 
     def numbers(name: str, key: str) -> Array:
         entries = [entries.get(name, {}).get(key) for entries in found]
         return np.array([math.nan if entry is None else float(entry) for entry in entries])
 
-    return [_Column(name, unit, numbers(name, "value"), numbers(name, "std")) for name, unit in units.items()]
+    def ends(name: str) -> Array:
+        return np.array([ends.get(name, (math.nan, math.nan)) for ends in known], dtype=float).reshape(-1, 2)
+
+    return [_Column(name, unit, numbers(name, "value"), numbers(name, "std"), ends(name))
+            for name, unit in units.items()]  # fmt: skip
 
 
 def _write_table(
@@ -136,6 +159,8 @@ def _write_table(
         table[f"{column.head}" if column.head not in table else f"{column.head}_result"] = column.values
         if (column.stds > 0).any():
             table[f"{column.head}_std"] = column.stds
+        if column.has_ends:
+            table |= {f"{column.head}{end}": column.ends[:, place] for place, end in enumerate(ENDS)}
     if any(faults):
         table["fault"] = faults
     write_series(folder.path / "table.csv", table)
@@ -169,6 +194,9 @@ def _write_netcdf(design: Design, tasks: Sequence[Task], columns: Sequence[_Colu
         data[column.name if column.name not in coords else f"{column.name}_result"] = (
             dims, column.values.reshape(sizes), {"units": column.unit},
         )  # fmt: skip
+        if column.has_ends:
+            data |= {f"{column.name}{end}": (dims, column.ends[:, place].reshape(sizes), {"units": column.unit})
+                     for place, end in enumerate(ENDS)}  # fmt: skip
     attributes = {"title": f"hedgebed sweep of {design.experiment.name}"}
     with replacing(folder.path / "table.nc") as temporary:
         try:
@@ -187,7 +215,11 @@ def _each_run(design: Design, columns: Sequence[_Column]) -> Table:
         ]
         for key in design.keys
     ]
-    rows = [[label_of(column.name), *_cells(column.unit, column.values)] for column in columns]
+    rows = []
+    for column in filter(lambda one: one.there, columns):
+        rows.append([label_of(column.name), *_cells(column.unit, column.values)])
+        if column.has_ends:
+            rows.append([f"{label_of(column.name)}: {KIND_OF_INTERVAL[design.experiment.name]}", *_ends(column)])
     numbers = [str(place + 1) for place in range(len(design.points))]
     return Table(
         title="Each run, in the order of table.csv", head=["quantity", "unit", *numbers], rows=[*varied, *rows]
@@ -197,9 +229,9 @@ def _each_run(design: Design, columns: Sequence[_Column]) -> Table:
 def _spreads(columns: Sequence[_Column]) -> Table:
     """Least, median and largest of each quantity over all runs."""
     rows = []
-    for column in columns:
+    for column in filter(lambda one: one.there, columns):
         there = column.values[np.isfinite(column.values)]
-        three = np.array([np.min(there), np.median(there), np.max(there)] if there.size else [math.nan] * 3)
+        three = np.array([np.min(there), np.median(there), np.max(there)])
         rows.append([label_of(column.name), *_cells(column.unit, three)])
     return Table(title="Over all runs", head=["quantity", "unit", "least", "median", "largest"], rows=rows)
 
@@ -216,6 +248,15 @@ def _cells(unit: str, values: Array, *, exact: bool = False) -> list[str]:
     """The unit and numbers of a table for reading, as in other reports: lengths in mm, angles in degrees."""
     shown, numbers = in_one_unit(values.tolist(), unit or "1", significant=6 if exact else 4, exact=exact)
     return [shown, *numbers]
+
+
+def _ends(column: _Column) -> list[str]:
+    """The unit and both ends of each interval, such as "1.6 to 6.4"; a dash where there is none."""
+    shown, cells = in_one_unit(column.ends.ravel().tolist(), column.unit or "1", significant=2)
+    return [
+        shown,
+        *(low if low == high else f"{low} to {high}" for low, high in zip(cells[::2], cells[1::2], strict=True)),
+    ]
 
 
 def _sensitivities(

@@ -168,7 +168,10 @@ def _law(first: Mapping[str, Any], fitted: str | None) -> tuple[float, float, di
         raise ValueError(f"fitted = {fitted!r} is no finished run of penetrate")
     if (material := material_of_today(str(folder.settings.get("material")))) != first["surface"]:
         raise ValueError(say("other_grains", fitted=fitted, material=material, surface=first["surface"]))
-    quantities = folder.read_result()["quantities"]
+    result = folder.read_result()
+    if result.get("status") == "stopped":  # of the beds that were whole when it was stopped
+        raise ValueError(f"fitted = {fitted!r} is no finished run of penetrate")
+    quantities = result["quantities"]
     values, sigmas = [], {}
     for name in ("stiffness", "damping"):
         value = float(quantities[name]["value"])

@@ -7,6 +7,7 @@ from pathlib import Path
 from matplotlib.axes import Axes
 from matplotlib.patches import Patch
 
+from rigid.intervals import half_of
 from vis.bed.tests import cut_profiles, flank_lines, quoted, thicknesses
 from vis.page.answer import MOST_ROWS
 from vis.page.page import Block, Section, Tile, code, text
@@ -47,7 +48,9 @@ def answer_tiles(result: Result) -> list[Tile]:
         entry = quantities[name]
         unit = {"1": "", "degrees": "°"}.get(entry["unit"], f" {entry['unit']}")
         note = figures[name]["verdict"] if name in figures else entry["note"]
-        tiles.append(Tile(name.replace("_", " ").capitalize(), quoted(entry, 1.0, unit), note))
+        tiles.append(
+            Tile(name.replace("_", " ").capitalize(), quoted({**entry, "std": half_of(entry)}, 1.0, unit), note)
+        )
     return tiles[:MOST_ROWS]
 
 

@@ -22,6 +22,7 @@ __all__ = ["answer_tiles", "on_axis", "write_sweep_report"]
 MOST_DRAWN = 8
 """Quantities that have a figure."""
 _WIDTH = 40  # letters of a line of a label
+_LEAST_SPAN = 3.0  # from which logarithmic axes serve [1]
 _MOST_COLOURS = 6  # values that are told apart by colour
 
 
@@ -53,6 +54,7 @@ def answer_tiles(result: Result) -> list[Tile]:
 def _over(report: Report, table: Mapping[str, NDArray], entry: Result) -> Block:
     """One quantity over each factor, coloured by the factor of fewest values."""
     factors, (values, label) = report.result["factors"], on_axis(table[entry["head"]], entry, entry["name"])
+    bars = _bars(table, entry, values)
     counts = {factor["key"]: len(np.unique(table[factor["key"]])) for factor in factors}
     by = min(counts, key=lambda key: counts[key]) if len(factors) > 1 else ""
     if by and counts[by] > _MOST_COLOURS:
@@ -64,8 +66,12 @@ def _over(report: Report, table: Mapping[str, NDArray], entry: Result) -> Block:
         x, under = on_axis(table[factor["key"]], factor, factor["key"])
         for group, colour in zip(groups, colours, strict=True):
             own = np.ones(len(x), bool) if group is None else table[by] == group
-            axis.plot(x[own], values[own], color=colour, marker="o", ms=4, ls="")
+            axis.errorbar(
+                x[own], values[own], yerr=None if bars is None else bars[:, own], color=colour, marker="o", ms=4, ls="",
+            )  # fmt: skip
         axis.set_xlabel(fill(under, _WIDTH))
+        if _wide(x) and _wide(values) and (bars is None or _wide(values - bars[0])):
+            _logarithmic(axis)
         if x.dtype.kind not in "fiu":
             axis.tick_params(axis="x", labelrotation=30)
     axes[0].set_ylabel(fill(label, _WIDTH))
@@ -76,9 +82,36 @@ def _over(report: Report, table: Mapping[str, NDArray], entry: Result) -> Block:
                  for one, colour in zip(shown.tolist(), colours, strict=True)]  # fmt: skip
         legend_above(drawing, marks)
     name, key = capital(_words(entry, entry["name"])), "over" if by else "over_plain"
+    said = "" if bars is None else " Bars: 95 % intervals of the runs, where they know them."
     return report.draw(
-        key, drawing, name=f"over-{entry['name']}", quantity=name, colour=_words(varied, by) if by else ""
+        key, drawing, name=f"over-{entry['name']}", quantity=name, colour=_words(varied, by) if by else "", bars=said
     )
+
+
+def _bars(table: Mapping[str, NDArray], entry: Result, values: NDArray) -> NDArray | None:
+    """Lengths of the bars of 95 % intervals in the unit of the axis, shape [2, runs], 0 where a run has none."""
+    heads = entry.get("ends", [])
+    if not heads or any(head not in table for head in heads):
+        return None
+    scale, _ = scale_of(table[entry["head"]].tolist(), str(entry["unit"] or "1"))
+    low, high = (table[head] / scale for head in heads)
+    return np.maximum(np.nan_to_num(np.array([values - low, high - values])), 0.0)
+
+
+def _wide(values: NDArray) -> bool:
+    """Whether numbers are above 0 and their largest is at least `_LEAST_SPAN` times the least."""
+    there = values[np.isfinite(values)] if values.dtype.kind in "fiu" else np.array([])
+    return bool(there.size and there.min() > 0 and there.max() >= _LEAST_SPAN * there.min())
+
+
+def _logarithmic(axis: Any) -> None:
+    """Both axes logarithmic: a power law is a straight line. Ticks are plain numbers."""
+    from matplotlib.ticker import LogFormatter
+
+    axis.set(xscale="log", yscale="log")
+    for one in (axis.xaxis, axis.yaxis):
+        one.set_major_formatter(LogFormatter())
+        one.set_minor_formatter(LogFormatter(minor_thresholds=(2, 0.5)))
 
 
 def _words(entry: Result, name: str) -> str:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from dem.measure.shearing import Shearing
+from experiments.bed.peaks import LEAST_PEAK, peak_over_noise, without_peak
 from experiments.bed.shear import fit_line, strength_of
 from experiments.bed.test_settings import BedShearSettings
 
@@ -49,3 +50,12 @@ def test_the_line_through_three_runs_is_mohr_coulomb_s():
 def test_pressures_that_will_not_do_are_refused(options, said):
     with pytest.raises(ValueError, match=said):
         BedShearSettings(bed="any", **options)
+
+
+def test_the_largest_of_noise_is_no_peak_and_a_hump_is_one():
+    """Stress ratios that only fluctuate, and the same with a hump three times their scatter and more."""
+    noise = 0.6 + 0.03 * np.random.default_rng(5).standard_normal(60)
+    hump = noise + 0.25 * np.exp(-(((np.arange(60) - 12) / 4) ** 2))
+    flat, peaked = ({"peak_over_noise": peak_over_noise(curve)} for curve in (noise, hump))
+    assert without_peak([flat, flat]) == flat["peak_over_noise"] < LEAST_PEAK < peaked["peak_over_noise"]
+    assert without_peak([peaked]) is None and without_peak([{}]) is None  # an older run does not know it

@@ -5,13 +5,17 @@ import math
 import shutil
 from dataclasses import asdict
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from golden import golden
 from scipy import stats
 
+from dem.grains.materials import REAL_GRAINS, read_material, real_grain_of
 from experiments.penetrate.headline import penetrate_headline
+from experiments.penetrate.rest import sinkage_interval
+from experiments.penetrate.settings import PenetrateSettings
 from experiments.penetrate.sure import (
     in_words,
     interval_of_rest,
@@ -20,6 +24,7 @@ from experiments.penetrate.sure import (
     trends,
 )
 from vis.page.folder import read_folder
+from vis.penetrate import summary
 from vis.penetrate.summary import summarise
 
 KEPT = Path(__file__).resolve().parents[3] / "docs" / "results"
@@ -157,3 +162,22 @@ def test_terminal_and_report_state_the_sinkage_among_real_grains(tmp_path):
 )
 def test_two_ends_have_one_unit(ends, words):
     assert in_words(*ends, "m").split(" to ") == words.split("|")
+
+
+def test_the_size_of_real_grains_is_that_of_the_material(tmp_path):
+    """0.2 mm of the sand that ships; of a file what it states, else 0: an upper bound of the error."""
+    stated, silent, wrong = (tmp_path / f"{name}.toml" for name in ("stated", "silent", "wrong"))
+    lines = ['format = "hedgebed-material/1"', 'name = "mine"', "density = 2900.0", "young = 70e9", "poisson = 0.25"]
+    lines += ["friction = 0.5", "restitution = 0.5"]
+    for path, more in ((stated, "real_grain = 0.3e-3"), (silent, ""), (wrong, "real_grain = 0.0")):
+        path.write_text("\n".join([*lines, more]) + "\n")
+    assert summary.REAL_GRAINS == REAL_GRAINS  # `vis` imports nothing of `dem`
+    assert [real_grain_of(name) for name in ("sand", str(stated), str(silent))] == [2e-4, 3e-4, None]
+    assert read_material(stated) == read_material(silent)  # the simulated grains are the same
+    with pytest.raises(ValueError, match=r"real_grain = 0\.0 must be"):
+        read_material(wrong)
+    for path, real in ((stated, 3e-4), (silent, 0.0)):
+        settings = PenetrateSettings(material=str(path), grain=0.004, allow_coarse=True)
+        findings = SimpleNamespace(settings=settings, beds={}, sinkages=lambda beds: [0.001, 0.0011])
+        found = sinkage_interval(findings, read_material(path))
+        assert found.grain_size[1] - found.value == pytest.approx(trends()["sinkage"].most * (0.004 - real))
