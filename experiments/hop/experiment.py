@@ -26,7 +26,7 @@ from experiments.runs.result import Result, quantities_of, quantity
 from experiments.runs.types import Json
 from experiments.runs.whole_runs import computed_run
 from experiments.tumble.result import trajectory_columns
-from rigid.hop import Flight, Launch, escape_speed, impulsive_launch, launch_speed_for, least_viable_angle
+from rigid.hop import Flight, Launch, escape_speed, impulsive_launch, launch, launch_speed_for, least_viable_angle
 from rigid.model.trial import Trial
 from rigid.planar.simulate import simulate
 
@@ -256,7 +256,7 @@ def _sentences(
     ]  # fmt: skip
     if by_brake and left.time < plan.wheel.inertia * speed / torque * (1 - 1e-9):
         said.append(say("leaves_early"))
-    said.append(_on_ground(plan, hop, given))
+    said.append(_on_ground(plan, hop, given, by_brake=by_brake))
     if by_brake and plan.distance is not None and sought is None and given is not None:
         most = "" if math.isinf(plan.wheel.max_speed) else f" up to {plan.wheel.max_speed:g} rad/s"
         said.append(say("no_wheel_speed", most=most, plan=plan))
@@ -292,7 +292,7 @@ def _warnings(plan: HopPlan, hop: Hop, given: SurfaceHop | None, escape: float |
     return found
 
 
-def _on_ground(plan: HopPlan, hop: Hop, given: SurfaceHop | None) -> str:
+def _on_ground(plan: HopPlan, hop: Hop, given: SurfaceHop | None, *, by_brake: bool) -> str:
     """Comparison of theory and model, and the reason of their difference if the numbers show it."""
     if given is None:
         return say("rigid_alone")
@@ -307,7 +307,20 @@ def _on_ground(plan: HopPlan, hop: Hop, given: SurfaceHop | None) -> str:
     faster, steeper = other.speed > (1 + ALIKE) * left.speed, other.angle - left.angle
     if left.slid and other.slid and faster and abs(steeper) <= SAME_ANGLE:
         return compared + say("into_speed")
+    if not left.slid and given.slides:
+        return compared + say("slides_there", mu_s=plan.tumbler.mu_s) + _if_it_slides(plan, hop, by_brake=by_brake)
     return compared + (say("thrown_up") if not left.slid and steeper > SAME_ANGLE else ".")
+
+
+def _if_it_slides(plan: HopPlan, hop: Hop, *, by_brake: bool) -> str:
+    """The launch from rigid ground whose static friction is as small as the sliding one; "." if there is none."""
+    sliding = replace(plan.tumbler, mu_s=plan.tumbler.sliding_friction, mu_d=plan.tumbler.sliding_friction)
+    turning = hop.effort if by_brake else plan.wheel.max_speed
+    try:
+        left = launch(sliding, hop.torque, plan.wheel.inertia * turning / hop.torque)
+    except RuntimeError:
+        return "."
+    return "." if left is None else say("slid_alike", left=left, angle=math.degrees(left.angle))
 
 
 run, resume = computed_run("hop", HopSettings, _compute, check=check)

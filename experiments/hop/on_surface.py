@@ -33,6 +33,7 @@ class SurfaceHop:
     launch: Launch | None  # None: it does not leave the ground for good
     flight: Flight | None  # None: it does not leave the ground, or does not come down
     trajectory: Trajectory  # from the start of the torque until a little after it has left
+    slides: bool = False  # whether no tip stuck from the start of the torque until it left
 
 
 def hop_trial(plan: HopPlan, *, torque: float, wheel_speed: float | None) -> Trial | None:
@@ -79,6 +80,7 @@ def hop_on_surface(trial: Trial, *, expected_time: float, longest: float, radius
     vx = float(middle.vx[0])
     vy = float(middle.vy[0]) + trial.gravity_sim * (0.5 * (left + down) - left)
     before = next((state for time, state in reversed(changes) if time < left), "stand")
+    slides = {state for time, state in changes if 0 <= time < left} <= {"stand", "slip", "hop"} and before == "slip"
     angle = math.atan2(vy, vx)
     launch = Launch(
         speed=math.hypot(vx, vy), angle=angle, spin=float(middle.omega[0]), slid=before == "slip",
@@ -87,7 +89,7 @@ def hop_on_surface(trial: Trial, *, expected_time: float, longest: float, radius
     if not 0 <= angle <= math.pi:
         return SurfaceHop(launch=None, flight=None, trajectory=trajectory)
     flown = flight(launch.speed, angle, gravity=trial.gravity_sim, radius=radius)
-    return SurfaceHop(launch=launch, flight=flown, trajectory=trajectory)
+    return SurfaceHop(launch=launch, flight=flown, trajectory=trajectory, slides=slides)
 
 
 def wheel_speed_on_surface(

@@ -23,6 +23,8 @@ SCAN = 80
 """Points between the least and the most that the actuator can do, to find where the distance lies."""
 SURFACE_SCAN = 6
 """Points among which the planar model's longest hop is found, for a refusal."""
+LEAST_HOP = 0.1
+"""A hop shorter than this share of the spike length is not stated in a refusal [1]."""
 HALVINGS = 8
 """How often the stretch between two of them is halved, where the distance lies in it."""
 GRAVITIES = 16
@@ -73,9 +75,22 @@ def find_hop(settings: HopSettings, platform_file: Path | None = None) -> tuple[
         enough = next((each for each in efforts if _hop(settings, means, each) is not None), None)
         would = "nor does any other" if enough is None else f"from some {enough:.3g} {means.unit} on it does"
         where = say("where", t=plan.tumbler)
-        would += _other_gravity(settings, _possible, (0.5, 2.0))
+        would += _same_on_surface(settings, plan, effort) + _other_gravity(settings, _possible, (0.5, 2.0))
         raise ValueError(say("no_hop", key=key, effort=effort, unit=means.unit, where=where, would=would))
     return plan, found
+
+
+def _same_on_surface(settings: HopSettings, plan: HopPlan, speed: float) -> str:
+    """Message on the planar model by a wheel at `speed` [rad/s] that is too slow for a hop from rigid ground; or ""."""
+    if settings.actuator != "brake" or plan.spike_count is None:
+        return ""
+    torque = plan.numbers["torque"].value
+    trial, braked = hop_trial(plan, torque=torque, wheel_speed=speed), plan.wheel.inertia * speed / torque
+    assert trial is not None
+    there = hop_on_surface(trial, expected_time=braked, longest=2 * braked + 2.0, radius=settings.body_radius)
+    if there.flight is None or there.flight.distance < LEAST_HOP * plan.tumbler.spike_length:
+        return ""
+    return say("hops_on_surface", plan=plan, flight=there.flight)
 
 
 def longest_flight(plan: HopPlan, left: Launch) -> float:
