@@ -15,9 +15,10 @@ more steeply where tips hold, and faster where they slide.
 
 Limit. This is the planar model (Reid and others, i-SAIRAS 2014, from its energies) for K to infinity with a C that
 leaves no rebound, with one exception. Under a sudden torque the model's tips slide first: the friction that holds them
-is needed at once, and the force of a spring, however stiff, takes time. Where mu_d < m c / (M s) they never stick again,
-also where mu_s is enough to hold them here. Rigid bodies have both motions as solutions. `launch` takes the one that
-sticks; with mu_s = mu_d it has the other, the model's limit. A torque that rises slowly can hold in the model too.
+is needed at once, and the force of a spring, however stiff, takes time. Where mu_d < m c / (M s) they never stick
+again, also where mu_s is enough to hold them here. Rigid bodies have both motions as solutions. `launch` takes the one
+that sticks; with mu_s = mu_d it has the other, the model's limit. Under a torque that rises slowly the model's tips can
+hold too.
 
 Angles. In a sudden launch the ground gives one impulse within its cone of friction. So a launch whose tips do not slide
 cannot be flatter than pi/2 - atan(mu_s). This friction-cone condition is ours. It is not compared with the hop angles
@@ -132,9 +133,10 @@ def launch(tumbler: Tumbler, torque: float, until: float = math.inf) -> Launch |
     """Launch under a constant `torque` [N m] on the platform from rest up to `until` [s] and none after.
 
     None where it does not leave the ground before the next tips come down: it tumbles, falls back, or does not tip at
-    all. After a brake it tumbles if M l cos(beta) omega^2 stays below W, as in a rig, where W is large. Compliant ground
-    may then still throw it: its springs return energy. Raises ValueError for a torque or a time of 0 or less. Raises RuntimeError where sliding on rigid ground has no
-    solution because friction is too high (above about 2, in a rig). Raises UnfitSettingsError for too large a torque.
+    all. After a brake it tumbles if M l cos(beta) omega^2 stays below W, as in a rig, where W is large. Compliant
+    ground may then still throw it: its springs return energy. Raises ValueError for a torque or a time of 0 or less.
+    Raises RuntimeError where sliding on rigid ground has no solution because friction is too high (above about 2, in a
+    rig). Raises UnfitSettingsError for too large a torque.
     """
     check_above_zero(torque=torque, **({"until": until} if until != math.inf else {}))
     if torque <= tumbler.tipping_torque:

@@ -83,11 +83,11 @@ def _on_given_ground(settings: HopSettings, plan: HopPlan, hop: Hop) -> tuple[Su
 
 
 def _with_the_law_s(
-    settings: HopSettings, plan: HopPlan, hop: Hop, best: dict[str, Json]
+    settings: HopSettings, plan: HopPlan, hop: Hop, best: dict[str, Json], *, beyond: bool
 ) -> tuple[dict[str, Json], Json, str]:
     """The quantities `best` with the standard deviation that follows from those of the law's parameters.
 
-    Also ``law_spread`` of the result, and a sentence.
+    Also ``law_spread`` of the result, and a sentence. `beyond` the range of the law no number has any.
     """
     escape = best["escape_speed"]["value"]
 
@@ -100,15 +100,20 @@ def _with_the_law_s(
         return answer_of(replace(plan, stiffness=value) if name == "stiffness" else replace(plan, damping=value))
 
     of_the_law = {name: entry["value"] for name, entry in best.items() if name in OF_THE_LAW}
-    if plan.fitted is not None:
+    if beyond and plan.fitted is not None:
+        parameters, law, stds = [name for name, _, _ in moved(plan.fitted)], "file", dict.fromkeys(of_the_law)
+    elif plan.fitted is not None:
         law, parameters = "file", [name for name, _, _ in moved(plan.fitted)]
         stds = spread_of_law(plan.fitted, lambda file: answer_of(plan_on(plan, file)), of_the_law)
     else:
         uncertain = uncertain_of(plan.numbers, find_surface(plan.surface))
         law, parameters = "", [one.name for one in uncertain]
-        stds = spread_of_surface(uncertain, of_surface, of_the_law)
+        stds = dict.fromkeys(of_the_law) if beyond else spread_of_surface(uncertain, of_surface, of_the_law)
     found = with_spread(best, stds) if plan.fitted is not None or parameters else best
-    return found, *spread_entries(found, _SPREAD_OF, surface=plan.surface, law=law, parameters=parameters)
+    entries = spread_entries(
+        found, _SPREAD_OF, surface=plan.surface, law=law, parameters=parameters, beyond=beyond and bool(parameters)
+    )
+    return found, *entries
 
 
 def _trial(settings: HopSettings, plan: HopPlan, hop: Hop) -> Trial | None:
@@ -165,7 +170,9 @@ def _result(settings: HopSettings, plan: HopPlan, hop: Hop, given: SurfaceHop | 
     said = _sentences(plan, hop, given, speed=speed, by_brake=by_brake, sought=sought)
     law: Json = {"parameters": []}
     if given is not None:
-        quantities, law, sentence = _with_the_law_s(settings, plan, hop, quantities)
+        quantities, law, sentence = _with_the_law_s(
+            settings, plan, hop, quantities, beyond=plan.of_earth or bool(_out_of_range(plan, given))
+        )
         said.append(sentence)
     asked = {"distance": f"of {plan.distance or 0:g} m", "wheel_speed": f"from {settings.wheel_speed_0 or 0:g} rad/s"}
     asked["torque"] = f"by {settings.torque or 0:g} N m"
@@ -269,8 +276,7 @@ def _warnings(plan: HopPlan, hop: Hop, given: SurfaceHop | None, escape: float |
     """Warnings on the error of rigid ground, and on a launch near the escape speed."""
     found, left, flown = [], hop.launch, hop.flight
     if given is not None:
-        of_grains = {"gravity": plan.tumbler.gravity, "diameter": plan.tip_diameter}
-        found += range_warnings(plan.fitted, given.trajectory, **of_grains) + law_warnings(plan.fitted)
+        found += _out_of_range(plan, given) + law_warnings(plan.fitted)
     other = given.launch if given is not None else None
     if given is None:
         found.append(say("taken_as_rigid", plan=plan))
@@ -290,6 +296,12 @@ def _warnings(plan: HopPlan, hop: Hop, given: SurfaceHop | None, escape: float |
         share = 100 * speed / escape
         found.append(say("near_escape", what=what, speed=speed, whose=whose, share=share, escape=escape))
     return found
+
+
+def _out_of_range(plan: HopPlan, given: SurfaceHop) -> list[str]:
+    """One warning for each number of the hop that is outside the range of the law."""
+    of_grains = {"gravity": plan.tumbler.gravity, "diameter": plan.tip_diameter}
+    return range_warnings(plan.fitted, given.trajectory, **of_grains)
 
 
 def _on_ground(plan: HopPlan, hop: Hop, given: SurfaceHop | None, *, by_brake: bool) -> str:

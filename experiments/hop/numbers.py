@@ -46,6 +46,7 @@ class HopPlan:
     warnings: tuple[str, ...] = ()
     fitted: GroundFile | None = None  # the file that the law comes from
     tip_diameter: float = 0.0  # of the platform [m]
+    of_earth: bool = False  # whether K is that of grains at 1 g, and the grains are under a much smaller gravity
 
     @property
     def law(self) -> Ground | None:
@@ -105,9 +106,9 @@ def plan_hop(settings: HopSettings, platform_file: Path | None = None) -> HopPla
     own_numbers: Json = {name: numbers.value(name) for name in body if name in numbers}
     Trial(gravity_sim=settings.gravity, gravity=settings.gravity, **own_numbers)  # refuses what no body can have
     warnings += numbers.check_actuation(settings.actuator, of_platform) + numbers.check_body(of_platform)
+    mass, earth = numbers.value("mass"), []
     if fitted is None:
-        mass = numbers.value("mass")
-        warnings += of_earth(numbers, surface, weight=mass * settings.gravity, mass=mass, counterweight=0.0)
+        earth = of_earth(numbers, surface, weight=mass * settings.gravity, mass=mass, counterweight=0.0)
     tumbler = Tumbler(
         mass=numbers.value("mass"), inertia=numbers.value("inertia"), spike_length=numbers.value("spike_length"),
         lean=of_platform.lean, gravity=settings.gravity, mu_s=numbers.value("mu_s"), mu_d=numbers.value("mu_d"),
@@ -122,7 +123,7 @@ def plan_hop(settings: HopSettings, platform_file: Path | None = None) -> HopPla
         stiffness=own_numbers.get("stiffness", 0.0), damping=own_numbers.get("damping", 0.0),
         spike_count=of_platform.spike_count, fitted=fitted, tip_diameter=of_platform.spike_diameter,
         distance=numbers.value("distance") if settings.asks_for == "distance" else None, numbers=numbers,
-        choices=choices, warnings=tuple(warnings),
+        choices=choices, warnings=(*warnings, *earth), of_earth=bool(earth),
     )  # fmt: skip
 
 

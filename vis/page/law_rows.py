@@ -82,6 +82,8 @@ def _with_error(result: Mapping[str, Any], name: str, law: bool) -> tuple[str, s
         value, error = split_spread(cell_of(entry["value"], NORMAL * std, entry["unit"]))
         if error:
             return value, error
+    if law and (result.get("law_spread") or {}).get("beyond"):
+        return cell_of(entry["value"], None, entry["unit"]), say("beyond_range")
     if law and name in (result.get("law_spread") or {}).get("absent", ()):
         last = name.split("_")[-1]
         return cell_of(entry["value"], None, entry["unit"]), say(_ABSENT.get(last, "not_there"))

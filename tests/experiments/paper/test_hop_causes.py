@@ -11,6 +11,7 @@ from experiments.cli.main import BAD_INPUT, DONE, main
 from experiments.hop.on_surface import hop_on_surface
 from rigid.hop import Tumbler, launch
 from rigid.model.trial import Trial
+from vis.paper.answer import answer_tiles
 
 CUBE = """
 format = "hedgebed-platform/1"
@@ -52,9 +53,7 @@ def model(tumbler, *, stiffness, damping, torque, wheel_speed):
 
 
 def free_cube(mu_s, mu_d):
-    return Tumbler(
-        mass=5.0, inertia=0.052, spike_length=LENGTH, lean=math.pi / 4, gravity=0.0057, mu_s=mu_s, mu_d=mu_d
-    )
+    return Tumbler(mass=5.0, inertia=0.052, spike_length=LENGTH, lean=math.pi / 4, gravity=0.0057, mu_s=mu_s, mu_d=mu_d)
 
 
 @pytest.mark.parametrize(("mu_d", "slides"), [(0.6, True), (1.2, False)])
@@ -71,14 +70,29 @@ def test_the_stiff_limit_of_the_model_slides_where_sliding_friction_is_below_the
 
 
 def test_a_hop_names_friction_where_the_tips_slide_here_and_stick_on_rigid_ground(tmp_path, cube):
-    words = "--mu-s 1.2 --mu-d 0.6 --stiffness 1e6 --damping 500 --torque 1.26 --gravity 0.0057 --distance 2".split()
+    words = [
+        "--mu-s",
+        "1.2",
+        "--mu-d",
+        "0.6",
+        "--stiffness",
+        "1e6",
+        "--damping",
+        "500",
+        "--torque",
+        "1.26",
+        "--gravity",
+        "0.0057",
+        "--distance",
+        "2",
+    ]
     assert main(["hop", "--platform", cube, *words, "--quiet", "--out", str(tmp_path / "run")]) == DONE
     result = json.loads((tmp_path / "run" / "result.json").read_text())
     golden("hop/slides_there", result["departures"]["sentences"])
 
 
 def test_a_wheel_too_slow_for_rigid_ground_may_still_hop_from_springs_and_the_refusal_says_so(tmp_path, capsys, cube):
-    words = "--gravity 0.5 --wheel-speed-0 150 --torque 1.8".split()
+    words = ["--gravity", "0.5", "--wheel-speed-0", "150", "--torque", "1.8"]
     assert main(["hop", "--platform", cube, *words, "--quiet", "--out", str(tmp_path / "run")]) == BAD_INPUT
     golden("hop/only_from_springs", " ".join(capsys.readouterr().err.split()))
 
@@ -94,3 +108,21 @@ def test_in_a_rig_a_slow_wheel_has_no_launch_from_rigid_ground_as_the_weight_hol
         held = rigged.mass_y * LENGTH * c * (1.2e-3 * speed / lever) ** 2 < rigged.weight
         assert held != leaves
         assert (launch(rigged, 1.8, 1.2e-3 * speed / 1.8) is not None) == leaves
+
+
+def test_beyond_the_range_of_a_law_no_interval_is_stated(tmp_path):
+    """K of sand is of grains at 1 g: at 1e-3 m/s2 it is 9,800 times too large, and its error says nothing."""
+    words = ["--surface", "sand", "--gravity", "1e-3", "--wheel-speed-0", "400"]
+    assert main(["hop", *words, "--quiet", "--out", str(tmp_path / "run")]) == DONE
+    result = json.loads((tmp_path / "run" / "result.json").read_text())
+    assert result["quantities"]["model_launch_speed"]["std"] is None and result["law_spread"]["beyond"]
+    assert any("beyond the law's range" in said for said in result["departures"]["sentences"])
+    rows = {tile.label: tile.errors[1] for tile in answer_tiles(result)}
+    assert rows["Launch from sand"] == "beyond range"
+
+
+def test_a_tumble_with_k_of_one_g_in_low_gravity_states_no_interval_either(tmp_path):
+    words = ["--surface", "sand", "--gravity", "0.05", "--torque", "0.2", "--duration", "0.2"]
+    assert main(["tumble", *words, "--quiet", "--out", str(tmp_path / "run")]) == DONE
+    result = json.loads((tmp_path / "run" / "result.json").read_text())
+    assert result["law_spread"]["beyond"] and result["quantities"]["max_speed"]["std"] is None
