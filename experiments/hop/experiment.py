@@ -78,7 +78,13 @@ def _on_given_ground(settings: HopSettings, plan: HopPlan, hop: Hop) -> tuple[Su
     if settings.actuator != "brake" or plan.distance is None:
         return given, None
     return given, wheel_speed_on_surface(
-        trial, given, distance=plan.distance, max_speed=plan.wheel.max_speed, longest=longest, radius=radius
+        trial,
+        given,
+        distance=plan.distance,
+        max_speed=plan.wheel.max_speed,
+        longest=longest,
+        radius=radius,
+        brake_time=plan.brake_time,
     )
 
 

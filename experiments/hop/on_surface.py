@@ -93,13 +93,21 @@ def hop_on_surface(trial: Trial, *, expected_time: float, longest: float, radius
 
 
 def wheel_speed_on_surface(
-    trial: Trial, start: SurfaceHop, *, distance: float, max_speed: float, longest: float, radius: float | None
+    trial: Trial,
+    start: SurfaceHop,
+    *,
+    distance: float,
+    max_speed: float,
+    longest: float,
+    radius: float | None,
+    brake_time: float | None = None,
 ) -> float | None:
     """The speed [rad/s] of a braked wheel whose hop from this ground goes `distance` [m], to 1e-4 of it.
 
     The launch speed of a short brake scales with the wheel's, the distance with its square: from the hop `start` that
     `trial` makes, the wheel's speed is scaled by sqrt(distance / found) until it fits. None where that fails within
-    `max_speed` [rad/s]: the platform leaves before a faster wheel has stopped, or not at all.
+    `max_speed` [rad/s]: the platform leaves before a faster wheel has stopped, or not at all. With a `brake_time` [s]
+    the torque follows the wheel's speed; without one it stays.
     """
     speed, found = trial.wheel_speed_0, start
     for _ in range(20):
@@ -113,7 +121,8 @@ def wheel_speed_on_surface(
         speed *= min(max(math.sqrt(distance / reached), 0.7), 1.5)
         if speed > max_speed:
             return None
-        faster = replace(trial, wheel_speed_0=speed)
+        torque = trial.torque if brake_time is None else trial.wheel_inertia * speed / brake_time
+        faster = replace(trial, wheel_speed_0=speed, torque=torque)
         found = hop_on_surface(faster, expected_time=found.launch.time, longest=longest, radius=radius)
     return None
 

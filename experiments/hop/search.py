@@ -75,16 +75,16 @@ def find_hop(settings: HopSettings, platform_file: Path | None = None) -> tuple[
         enough = next((each for each in efforts if _hop(settings, means, each) is not None), None)
         would = "nor does any other" if enough is None else f"from some {enough:.3g} {means.unit} on it does"
         where = say("where", t=plan.tumbler)
-        would += _same_on_surface(settings, plan, effort) + _other_gravity(settings, _possible, (0.5, 2.0))
+        would += _same_on_surface(settings, plan, means, effort) + _other_gravity(settings, _possible, (0.5, 2.0))
         raise ValueError(say("no_hop", key=key, effort=effort, unit=means.unit, where=where, would=would))
     return plan, found
 
 
-def _same_on_surface(settings: HopSettings, plan: HopPlan, speed: float) -> str:
+def _same_on_surface(settings: HopSettings, plan: HopPlan, means: _Means, speed: float) -> str:
     """Message on the planar model by a wheel at `speed` [rad/s] that is too slow for a hop from rigid ground; or ""."""
     if settings.actuator != "brake" or plan.spike_count is None:
         return ""
-    torque = plan.numbers["torque"].value
+    torque = means.torque(speed)
     trial, braked = hop_trial(plan, torque=torque, wheel_speed=speed), plan.wheel.inertia * speed / torque
     assert trial is not None
     there = hop_on_surface(trial, expected_time=braked, longest=2 * braked + 2.0, radius=settings.body_radius)
@@ -133,16 +133,22 @@ def _other_gravity(
 
 
 def _by_brake(plan: HopPlan, settings: HopSettings) -> _Means:
-    tumbler, wheel, torque = plan.tumbler, plan.wheel, plan.numbers["torque"].value
-    if torque <= tumbler.tipping_torque:
-        raise _too_weak("torque", torque, tumbler)
+    tumbler, wheel, time = plan.tumbler, plan.wheel, plan.brake_time
     most, limit = wheel.max_speed, "its largest speed"
     if math.isinf(most):
         most, limit = max(BEYOND * _impulsive_speed(plan, settings), settings.wheel_speed_0 or 0.0), "no limit known"
+
+    def torque(speed: float) -> float:
+        return plan.numbers["torque"].value if time is None else wheel.inertia * speed / time
+
+    if torque(most) <= tumbler.tipping_torque:
+        raise _too_weak("torque", torque(most), tumbler)
+    slowest = 0.0 if time is None else time * tumbler.tipping_torque / wheel.inertia * (1 + 1e-6)
+    what = "brake_means" if time is None else "timed_brake_means"
     return _Means(
-        leave=lambda speed: brake_launch(tumbler, wheel.inertia * speed, torque), torque=lambda speed: torque,
-        least=1e-4 * most, most=most, unit="rad/s",
-        what=say("brake_means", plan=plan, torque=torque, most=most, limit=limit),
+        leave=lambda speed: brake_launch(tumbler, wheel.inertia * speed, torque(speed)), torque=torque,
+        least=max(1e-4 * most, slowest), most=most, unit="rad/s",
+        what=say(what, plan=plan, torque=torque(most), most=most, limit=limit),
     )  # fmt: skip
 
 
