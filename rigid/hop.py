@@ -83,6 +83,15 @@ class Tumbler(Coulomb):
         """Least torque that tips it from rest [N m]: W l sin(lean)."""
         return self.weight * self.spike_length * math.sin(self.lean)
 
+    @property
+    def slip_torque(self) -> float:
+        """Least torque that makes it slip at rest if it is there at once [N m]: mu_s W (J + m h^2) / (m h).
+
+        h = l cos(lean), the height of the centre.
+        """
+        h = self.spike_length * math.cos(self.lean)
+        return self.mu_s * self.weight * (self.inertia + self.mass * h * h) / (self.mass * h)
+
 
 @dataclass(frozen=True, kw_only=True)
 class Launch:

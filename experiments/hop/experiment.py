@@ -8,7 +8,7 @@ from compliant ground (`experiments.hop.on_surface`); the result has both.
 import math
 from dataclasses import asdict, replace
 
-from experiments.platform.ground_file import law_warnings, range_warnings, with_kept_ground
+from experiments.platform.ground_file import law_warnings, range_warnings, reached, with_kept_ground
 from experiments.platform.law_spread import (
     Answer,
     moved,
@@ -32,6 +32,7 @@ from rigid.planar.simulate import simulate
 
 from .numbers import HopPlan, plan_on
 from .on_surface import SurfaceHop, flight_path, hop_on_surface, hop_trial, wheel_speed_on_surface
+from .otherwise import otherwise, otherwise_words
 from .search import Hop, find_hop, longest_flight
 from .settings import HopSettings, say
 
@@ -146,7 +147,8 @@ def _result(settings: HopSettings, plan: HopPlan, hop: Hop, given: SurfaceHop | 
     speed = hop.effort if by_brake else min(torque * left.time / wheel.inertia, wheel.max_speed)
     radius = settings.body_radius
     escape = escape_speed(settings.gravity, radius) if radius is not None else None
-    sudden = impulsive_launch(tumbler, wheel.inertia)
+    sudden, spin_up = impulsive_launch(tumbler, wheel.inertia), min(tumbler.slip_torque, tumbler.tipping_torque)
+    spin_up = min(spin_up, wheel.motor_torque)
     wanted = None
     if flown is not None:
         wanted = launch_speed_for(flown.distance, sudden.angle, gravity=settings.gravity, radius=radius)
@@ -161,6 +163,8 @@ def _result(settings: HopSettings, plan: HopPlan, hop: Hop, given: SurfaceHop | 
         "model_wheel_speed": quantity(sought, "rad/s", note),
         "wheel_speed_impulsive": quantity(wanted / sudden.speed if wanted else None, "rad/s", lands or say("closed")),
         "torque": quantity(torque, "N m", "on the platform, constant"),
+        "spin_up_torque": quantity(spin_up if by_brake else None, "N m", say("of_spin_up_torque")),
+        "spin_up_time": quantity(wheel.inertia * speed / spin_up if by_brake else None, "s", say("of_spin_up_time")),
         "torque_time": quantity(driven, "s", say("of_torque_time")),
         "rotation": quantity(left.rotation, "rad", say("of_rotation")),
         "launch_speed": quantity(left.speed, "m/s", say("of_launch_speed")),
@@ -174,6 +178,9 @@ def _result(settings: HopSettings, plan: HopPlan, hop: Hop, given: SurfaceHop | 
         "escape_ratio": quantity(left.speed / escape if escape else None, "1", say("of_escape")),
     } | _model_quantities(plan, hop, given, escape)
     said = _sentences(plan, hop, given, speed=speed, by_brake=by_brake, sought=sought)
+    others = otherwise(settings, plan, hop)
+    early = [_spin_up(plan, speed=speed, most=spin_up)] if by_brake else []
+    said[1:1] = [*early, *filter(None, [otherwise_words(settings, others)])]
     law: Json = {"parameters": []}
     if given is not None:
         quantities, law, sentence = _with_the_law_s(
@@ -198,6 +205,7 @@ def _result(settings: HopSettings, plan: HopPlan, hop: Hop, given: SurfaceHop | 
         surface=plan.surface,
         departures={"sentences": said},
         law_spread=law,
+        otherwise=others,
         platform={
             "name": plan.platform.name,
             "mass": plan.platform.mass,
@@ -270,12 +278,25 @@ def _sentences(
     if by_brake and left.time < plan.wheel.inertia * speed / torque * (1 - 1e-9):
         said.append(say("leaves_early"))
     said.append(_on_ground(plan, hop, given, by_brake=by_brake))
+    of_surface = "stiffness" in plan.numbers and plan.numbers["stiffness"].origin.startswith("surface ")
+    if given is not None and of_surface and not find_surface(plan.surface).granular:
+        said.append(say("spikes_give", plan=plan, deep=1e3 * reached(given.trajectory)["depth"]))
     if by_brake and plan.distance is not None and sought is None and given is not None:
         most = "" if math.isinf(plan.wheel.max_speed) else f" up to {plan.wheel.max_speed:g} rad/s"
         said.append(say("no_wheel_speed", most=most, plan=plan))
     if sought is not None and plan.distance is not None and abs(sought / speed - 1) > 0.5 * ALIKE:
         said.append(say("wheel_speed_needed", sought=sought, plan=plan))
     return said
+
+
+def _spin_up(plan: HopPlan, *, speed: float, most: float) -> str:
+    """How fast the wheel may be spun up to `speed` [rad/s] by at most `most` [N m] without a motion of the platform."""
+    tumbler = plan.tumbler
+    time, share = plan.wheel.inertia * speed / most, 100 * most / plan.wheel.motor_torque
+    if most >= plan.wheel.motor_torque:
+        return say("spin_up_by_motor", time=time, speed=speed, most=most)
+    of_motor = f", {share:.2g} % of the motor's" if share > 0 else ""
+    return say("spin_up", time=time, speed=speed, most=most, of_motor=of_motor, t=tumbler)
 
 
 def _warnings(plan: HopPlan, hop: Hop, given: SurfaceHop | None, escape: float | None) -> list[str]:

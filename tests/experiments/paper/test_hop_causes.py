@@ -9,7 +9,7 @@ from golden import golden
 
 from experiments.cli.main import BAD_INPUT, DONE, main
 from experiments.hop.on_surface import hop_on_surface
-from rigid.hop import Tumbler, launch
+from rigid.hop import Tumbler, flight, launch
 from rigid.model.trial import Trial
 from vis.paper.answer import answer_tiles
 
@@ -126,3 +126,19 @@ def test_a_tumble_with_k_of_one_g_in_low_gravity_states_no_interval_either(tmp_p
     assert main(["tumble", *words, "--quiet", "--out", str(tmp_path / "run")]) == DONE
     result = json.loads((tmp_path / "run" / "result.json").read_text())
     assert result["law_spread"]["beyond"] and result["quantities"]["max_speed"]["std"] is None
+
+
+def test_a_hop_states_its_spin_up_and_what_it_depends_on(tmp_path, cube):
+    """By hand: mu_s W (J + m h^2) / (m h) slips, W l sin(lean) tips; the same search at half and twice mu_s."""
+    words = ["--gravity", "0.0057", "--distance", "2", "--brake-time", "0.1"]
+    assert main(["hop", "--platform", cube, *words, "--quiet", "--out", str(tmp_path / "run")]) == DONE
+    result = json.loads((tmp_path / "run" / "result.json").read_text())
+    value = {name: entry["value"] for name, entry in result["quantities"].items()}
+    slips = 0.5 * 5 * 0.0057 * (0.052 + 5 * 0.125**2) / (5 * 0.125)
+    assert value["spin_up_torque"] == pytest.approx(slips) and slips < 5 * 0.0057 * 0.125
+    assert value["spin_up_time"] == pytest.approx(1.2e-3 * value["wheel_speed"] / slips)
+    for mu_s, speed in zip((0.25, 1.0), result["otherwise"]["mu_s"]["values"], strict=True):
+        tumbler = free_cube(mu_s, mu_s / 2)
+        left = launch(tumbler, 1.2e-3 * speed / 0.1, 0.1)
+        assert flight(left.speed, left.angle, gravity=0.0057).distance == pytest.approx(2.0, rel=1e-3)
+    golden("hop/cube", [*result["departures"]["sentences"], *(f"{t.label}: {t.value}" for t in answer_tiles(result))])
