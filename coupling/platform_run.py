@@ -118,9 +118,13 @@ class PlatformRun(EnergyBalance, Stepper):
 
     @property
     def fraction(self) -> float:
-        """Share of the run that is done, 0 to 1; the placement counts with its expected duration."""
+        """Share of the run that is done, 0 to 1; the placement counts with its expected duration.
+
+        One that takes longer nears that ever more slowly.
+        """
         placing = self._placement_time
-        done = placing + self.body.time if self.placed else min(placing, self.body.time)
+        passed = self.body.time / placing if placing > 0 else 0.0
+        done = placing + self.body.time if self.placed else placing * (passed if passed <= 0.8 else 1 - 0.16 / passed)
         return float(min(1.0, done / (placing + self.duration)))
 
     @property

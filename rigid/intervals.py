@@ -1,8 +1,10 @@
 """Half-widths of the intervals that results quote: Student's of a mean over a few beds, and the normal law's."""
 
 import math
+from collections.abc import Mapping
+from typing import Any
 
-__all__ = ["CONFIDENCE", "NORMAL", "half_width", "student"]
+__all__ = ["CONFIDENCE", "NORMAL", "half_of", "half_width", "student"]
 
 CONFIDENCE = 0.95
 """Share of cases in which an interval contains the true value, where nothing else is stated."""
@@ -28,3 +30,13 @@ def half_width(std: float | None, count: int) -> float | None:
     standard deviation is None: one value shows no scatter.
     """
     return None if std is None or count < 2 else student(count - 1) * std / math.sqrt(count)
+
+
+def half_of(entry: Mapping[str, Any]) -> float | None:
+    """Half of the 95 % interval of a fitted number, such as a quantity of result.json with its standard error ``std``.
+
+    Student's where its ``freedom`` is known, else that of the normal distribution. None for a number without a standard
+    error.
+    """
+    std, freedom = entry.get("std"), entry.get("freedom")
+    return None if std is None else (NORMAL if freedom is None else student(freedom)) * std

@@ -37,6 +37,19 @@ def one_core():
 
 
 @pytest.fixture(scope="session", autouse=True)
+def no_pace(tmp_path_factory):
+    """Estimates are those of a machine that has not run anything yet, and runs of tests do not change those of others.
+
+    The file cannot be written: its folder is a file.
+    """
+    with pytest.MonkeyPatch.context() as patch:
+        no_folder = tmp_path_factory.mktemp("pace") / "file"
+        no_folder.touch()
+        patch.setattr("experiments.runs.pace._file", lambda: no_folder / "pace.json")
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
 def one_command_line():
     """The options of all commands are set out once, not in each of a thousand calls of the command line."""
     from experiments.cli import main

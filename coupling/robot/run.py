@@ -14,6 +14,7 @@ from rigid.ground.reaction import Reaction, State
 
 from .bed_feet import BedFeet
 from .body import MujocoRobot
+from .fixed import Buried, FixedGeoms
 from .law_feet import LawFeet
 from .stability import ITERATED, ExchangeLoad, check_exchange
 
@@ -83,6 +84,8 @@ class RobotRun(EnergyBalance, Stepper):
         self._every = max(1, round(energy_interval / self.macro_step))
         self.energy_interval = self._every * self.macro_step
         self.lowest_other = (np.inf, "")  # Lowest height of what is no foot, when sampled [m], and its geom
+        self._fixed = FixedGeoms(robot.model, robot.feet, robot.other_geoms)
+        self.buried = Buried(0.0)  # The deepest geom that is fixed to a foot and is none, when sampled
         self._feet: list[Vector] = []
         self._joints: list[Vector] = []
         robot.begin(self.macro_step, ground.lag)
@@ -158,6 +161,7 @@ class RobotRun(EnergyBalance, Stepper):
     def _sample(self) -> None:
         super()._sample()
         self.lowest_other = min(self.lowest_other, self.robot.lowest_other())
+        self.buried = max(self.buried, self._fixed.deepest(self.robot.data))
         self.load = max(self.load, self._load.now().at(self.macro_step))
 
     @property
@@ -205,7 +209,7 @@ class RobotRun(EnergyBalance, Stepper):
         own: State = {
             "frames": np.array(self._frames), "rows": self._row_table, "feet": np.array(self._feet),
             "joints": np.array(self._joints), "lowest": np.array([str(part) for part in self.lowest_other]),
-            "load": np.array(self.load),
+            "load": np.array(self.load), "buried": np.array([str(self.buried.depth), self.buried.name]),
         }  # fmt: skip
         return prefixed("run", own) | prefixed("balance", self._balance_state()) | self.master.state()
 
@@ -217,6 +221,9 @@ class RobotRun(EnergyBalance, Stepper):
         self._feet, self._joints = (list(np.array(own[name], dtype=float)) for name in ("feet", "joints"))
         lowest, name = (str(part) for part in np.asarray(own["lowest"]))
         self.lowest_other = (float(lowest), name)
+        if "buried" in own:  # not in that of an earlier version
+            depth, name = (str(part) for part in np.asarray(own["buried"]))
+            self.buried = Buried(float(depth), name)
         self.load = float(own.get("load", self.load))  # an earlier version has it of the start alone
         self._restore_balance(part_of(state, "balance"))
         self.master.restore(state)

@@ -3,7 +3,7 @@
 `Settings`, `check`, `run` and `resume` are those of `hedgebed campaign`; calling one imports what computes,
 and `Settings` is imported when it is first used.
 
-Imports `experiments.runs`, `rigid`.
+Imports `experiments.runs`, `rigid`, `vis.page`.
 """
 
 from pydantic import BaseModel

@@ -28,6 +28,7 @@ from rigid.checks.shipped import find_shipped
 from rigid.digests import check_as_written
 
 from .digests import changed_files, write_digests
+from .from_folder import Found, campaign_from_folder
 from .recording import Recording, read_recording, write_recording
 from .tables import (
     NOTE_WORDS,
@@ -48,6 +49,7 @@ __all__ = [
     "keep_digests",
     "keep_model",
     "new_campaign",
+    "new_from_recordings",
     "place_campaign",
     "read_campaign",
     "read_model",
@@ -178,6 +180,17 @@ def new_campaign(folder: str | Path, *, kind: Literal["tumble", "penetration"]) 
     except OSError as error:
         raise ValueError(f"{str(folder)!r} cannot be written ({error}): a folder that can be was expected") from error
     return folder
+
+
+def new_from_recordings(folder: str | Path, source: str | Path) -> Found:
+    """Write a campaign of the pushes and drops in the CSV files of `source` into `folder`, and return what was found.
+
+    Columns are recognised by their headings. What the recordings do not show is "unknown" in campaign.toml. Raises
+    ValueError where the folder is in use, where there is no recording, and where one cannot be read.
+    """
+    folder = Path(folder)
+    _refuse_used(folder)
+    return campaign_from_folder(folder, Path(source))
 
 
 def check_target(target: str | Path, *, keep_out: Path | None = None) -> Path:

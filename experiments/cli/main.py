@@ -265,12 +265,36 @@ def _campaign_new(
     folder: Annotated[Path, Parameter(help="Where to write it; must be new or empty.")],
     /,
     *,
-    kind: Annotated[Literal["tumble", "penetration"], Parameter(help="Kind of trials.", show_default=False)],
+    kind: Annotated[
+        Literal["tumble", "penetration"] | None, Parameter(help="Kind of trials of a template.", show_default=False)
+    ] = None,
+    recordings: Annotated[
+        Path | None,
+        Parameter(name="--from", help="Folder of CSV files: pushes and drops, a trial each.", show_default=False),
+    ] = None,
 ) -> int:
-    """Write a template: campaign.toml with every key explained, and short recordings to replace."""
-    from experiments.campaign.files import new_campaign
+    """Write a template with every key explained, or with --from a campaign of your own recordings.
+
+    Of recordings the columns are recognised by their headings (force [N], z_mm). They are copied, with the names of
+    the format in the first line. What they do not show is "unknown" in campaign.toml and listed.
+    """
+    from experiments.campaign.files import new_campaign, new_from_recordings
 
     with refusing():
+        if recordings is not None:
+            if kind == "tumble":
+                raise ValueError("--from reads pushes and drops, which are --kind penetration: found --kind tumble")
+            found = new_from_recordings(folder, recordings)
+            print(f"campaign: {folder / 'campaign.toml'}")
+            for line in found.columns:
+                say(line)
+            say("to fill in:")
+            for line in found.unknown:
+                say(f"  - {line}")
+            say(f"then `hedgebed campaign check {folder}`")
+            return DONE
+        if kind is None:
+            raise ValueError("--kind is missing: tumble or penetration was expected, or --from FOLDER of recordings")
         new_campaign(folder, kind=kind)
     print(f"campaign: {folder / 'campaign.toml'}")
     made_up = ", ".join(sorted(str(path.relative_to(folder)) for path in folder.rglob("*.csv")))

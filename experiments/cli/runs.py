@@ -24,6 +24,7 @@ from experiments.runs.result import Result
 from experiments.runs.streams import RefusedError, file_words, say, stdout_to_stderr
 from experiments.runs.whole_runs import draw_report, keeping_status
 from rigid.checks.unfit import UnfitSettingsError
+from rigid.intervals import half_of
 from vis.page.numbers import beside, with_squares
 
 __all__ = ["BAD_INPUT", "DONE", "FAILED", "STOPPED", "carry_out", "redraw_old_report", "show_folder"]
@@ -222,15 +223,15 @@ def _show_all(result: Mapping[str, Any], console: Console) -> None:
     quantities = result.get("quantities", {})
     stds = [quantity.get("std") for quantity in quantities.values()]  # 0: exact, or computed once
     spreads = any(isinstance(std, float) and math.isfinite(std) and std > 0 for std in stds)
+    fitted = result.get("experiment") == "diagnose"
     if spreads:
-        fitted = result.get("experiment") == "diagnose"
-        table.add_column("standard error" if fitted else "spread (std)", justify="right")
+        table.add_column("± 95 %" if fitted else "spread (std)", justify="right")
     intervals = any(quantity.get("interval") for quantity in quantities.values())
     if intervals:
         table.add_column("90 % interval", justify="right")
     table.add_column("unit")
     for name, quantity in quantities.items():
-        value, std = quantity.get("value"), quantity.get("std")
+        value, std = quantity.get("value"), half_of(quantity) if fitted else quantity.get("std")
         cells = [_number(std, None) if std != 0 else "exact"] if spreads else []
         cells += [_interval(quantity.get("interval"))] if intervals else []
         shown = f"below {quantity['at_most']:.2g}" if "at_most" in quantity else _number(value, std)

@@ -24,9 +24,9 @@ from experiments.runs.result import Result, quantities_of
 from experiments.runs.types import Json
 from experiments.runs.whole_runs import computed_run
 from experiments.spatial.settings import ON_ANY_GROUND
-from rigid.intervals import half_width
+from rigid.intervals import half_of, half_width
 from rigid.planar.trajectory import LAUNCH_DISTANCE
-from vis.penetrate.errors import half_of, in_95
+from vis.penetrate.errors import in_95
 
 from . import robots as compare_robots
 from . import spatial as compare_spatial

@@ -17,7 +17,7 @@ from experiments.runs.progress import Progress
 from experiments.runs.result import Result
 from experiments.runs.types import Json
 from experiments.runs.whole_runs import computed_run
-from vis.diagnose.usable import has_numbers_to_use, stiffness_words
+from vis.diagnose.usable import gap_in_scatter, has_numbers_to_use, stiffness_words
 
 from .core.diagnosis import diagnose
 from .core.outcome import Diagnosis
@@ -28,7 +28,8 @@ from .fit.problem import Problem
 from .noise.colour import together
 from .push.frame import at_the_tip
 from .report.document import write_diagnosis
-from .report.sentences import findings_in_words, spread_sentences, told_tables, where_sentences
+from .report.sentences import findings_in_words, told_tables, where_sentences
+from .report.spread import spread_sentences
 from .report.summary import summary_sentences, title_words
 
 __all__ = ["check", "diagnose_campaign", "make_problem", "resume", "run"]
@@ -120,7 +121,7 @@ def _quantity(entry: Json, *, at_end: bool) -> Json:
     if entry["std"] is None or not entry.get("determined", True):
         bound = f"; at most {numeral(entry['at_most'], 2)} (95 % bound)" if "at_most" in entry else ""
         return {**number, "std": None, "note": f"these trials do not determine it: no standard error{bound}"}
-    return {**number, "note": "standard error of the fit, right if the model is and the noise has the size found"}
+    return {**number, "note": "error of the fit, right if the model is and the noise has the size found"}
 
 
 def _result(found: Diagnosis, diagnosis: Json, made_up: str | None) -> Result:
@@ -130,13 +131,12 @@ def _result(found: Diagnosis, diagnosis: Json, made_up: str | None) -> Result:
                                 "note": "chi-square per sample"}
         for stage, part in parts
     }  # fmt: skip
-    if weighed := diagnosis.get("gap_with_scatter"):
+    if "gap_with_scatter" in diagnosis:
         note = "chi-square per sample, what replicates differ by added to the sensors' variance"
         quantities |= {
-            f"gap_with_scatter_{stage}_{part}": {"value": weighed[stage][part], "unit": "1",
-                                                 "std": weighed.get(f"{stage}_std", {}).get(part), "note": note}
+            f"gap_with_scatter_{stage}_{part}": {**gap_in_scatter(diagnosis, part, stage), "note": note}
             for stage, part in parts
-        }  # fmt: skip
+        }
     at_end = {
         stage: {bound["parameter"] for bound in bounds if bound["at_bound"]}
         for stage, bounds in diagnosis["at_bounds"].items()

@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 from coupling.lammps import LammpsBed
 from dem import Bed
+from experiments.runs.pace import runtime_name
 from experiments.runs.progress import Progress, as_expected
 
 __all__ = ["BedProgress", "Stages", "show_bed"]
@@ -20,6 +21,7 @@ def show_bed(progress: Progress, bed: Bed | LammpsBed) -> None:
     progress.show_grains(
         grain_count=bed.grain_count, awake_count=bed.awake_count, grain_steps=bed.grain_steps,
         slow_count=0 if sleeper is None else sleeper.awake - sleeper.fast,
+        runtime=runtime_name(arch=bed.runtime.arch, threads=bed.runtime.threads) if isinstance(bed, Bed) else "",
     )  # fmt: skip
 
 

@@ -19,7 +19,7 @@ from .softening import Softening, stable_overlap
 
 __all__ = [
     "bed_numbers", "bed_warnings", "overlap_warning", "residual_warning", "reversal_warning", "sides_warning",
-    "unsettled_warning", "write_bed_series",
+    "sleep_words", "unsettled_warning", "write_bed_series",
 ]  # fmt: skip
 
 AnyRun = CoupledTumble | SpatialRun | RobotRun
@@ -38,6 +38,9 @@ def write_bed_series(folder: Path, run: AnyRun) -> None:
     samples = run.samples | {f"{name}_lost": values for name, values in run.losses.items()}
     columns = {BED_COLUMNS.get(name, f"{name}_J"): values for name, values in samples.items()}
     write_series(folder / "series" / "bed.csv", columns)
+
+
+LITTLE = 0.9  # Share of the grain-steps from which on sleep is said to save next to nothing [1]
 
 
 def bed_numbers(
@@ -59,6 +62,21 @@ def bed_numbers(
         "sleep": settings.sleep, "grain_steps": float(done[-1] - done[0]),
         "grain_steps_all_awake": float(steps * int(bed.grain_count)),
     }  # fmt: skip
+
+
+def sleep_words(settings: GrainsSettings, run: AnyRun, bed: Bed) -> list[str]:
+    """How much of the work sleep left out, and who sleeps at the end, in a sentence; none of a bed that does not sleep.
+
+    A second one where it left out next to nothing.
+    """
+    sleeper = bed.sleeper if settings.sleep else None
+    if sleeper is None:
+        return []
+    done, steps = run.samples["grain_steps"], (run.master.count - run.placing_steps) * settings.substeps
+    share = float(done[-1] - done[0]) / max(1.0, float(steps * bed.grain_count))
+    asleep, slow = bed.grain_count - sleeper.awake, sleeper.awake - sleeper.fast
+    told = [say("slept", share=share, asleep=asleep, slow=slow, count=bed.grain_count)]
+    return told if share < LITTLE else [*told, say("slept_little")]
 
 
 def bed_warnings(bed: Bed, surface: str, *, across: float, foot: str = "spike") -> Iterator[str]:

@@ -21,6 +21,7 @@ from rigid.ground.reaction import State
 
 from . import say
 from .bed_progress import show_bed
+from .bed_result import sleep_words
 
 __all__ = ["CHECKPOINT", "Followed", "Frames"]
 
@@ -125,6 +126,9 @@ class Followed(ABC, Generic[Run]):
             clock = say("own_time") if " at t = " in str(error) else ""
             raise failed_as(error, f"{when}: {error}{clock}; {_remedy(error)}; {left}") from error
         folder.save_checkpoint(CHECKPOINT, run.state())
+        if isinstance(run.ground, BedGround):
+            for sentence in sleep_words(settings, run, run.ground.bed):
+                progress.message(sentence)
         return found
 
 

@@ -13,13 +13,18 @@ from functools import cached_property
 from typing import Any, Generic, TypeVar
 
 from coupling import BedGround
+from coupling.lowered_gravity import pace_under
 from coupling.members import Member
+from coupling.platform_run import PLACING_WAY, REST_TIME
 from dem import Bed, Graded
+from dem.contact.timestep import time_step_for
+from dem.engine.runtime import usable_cores
 from dem.engine.values import refuse_sleep
 from dem.grains.materials import Material
 from dem.grains.materials import material as find_material
 from experiments.platform.surfaces import find_surface, surface_names
 from experiments.runs.folder import RunFolder
+from experiments.runs.pace import known_pace, runtime_name
 from experiments.runs.progress import Progress
 from experiments.runs.result import Result
 from experiments.runs.stopping import held_back
@@ -36,17 +41,13 @@ from .recipes import recipe_of
 from .settings import GrainsSettings
 from .sizes import carried_height, expected_grain_count
 from .softening import Softening, check_young, run_limit, soften_material
-from .staged import staged_bed
+from .staged import RAIN, preparation_time, staged_bed
 from .where import check_where
 
-__all__ = ["MARGIN", "RAIN", "Forecast", "PlatformOnBed"]
+__all__ = ["MARGIN", "Forecast", "PlatformOnBed"]
 
 MARGIN = 3.0  # Sand beyond the outermost footprint, over a spike's diameter [1]
-RAIN = 2.5  # Height of the loose column that a bed is rained from, over the bed's depth [1]
 TOUCH = 1e-3  # Force on a row, or in space on all spikes, that counts as touching for the torque, over the weight [1]
-PREPARED = 1.0
-"""What the preparation of a bed at 1 g costs, over a second of a run [s]. Beds of 8 mm grains, 0.05
-and 0.1 m deep, took 0.48 and 0.36 s of simulated time; the rest allows for finer grains, which were not measured."""
 MOST_GRAINS = 3e6  # More are refused: the run would take days
 
 Settings = TypeVar("Settings", bound=GrainsSettings)
@@ -267,14 +268,44 @@ class PlatformOnBed(Followed[Run], Generic[Settings, Run, Expected]):
         return {"duration": self.duration, "lowering_speed": self.lowering_speed, **self.settings.stepping()}
 
     @property
+    def placement_time(self) -> float:
+        """About how long the platform is placed, on the bed's clock [s]; 0 without a placement."""
+        speed = self.lowering_speed
+        return 0.0 if speed is None else pace_under(self.first_gravity) * REST_TIME + PLACING_WAY / speed
+
+    @property
     def costs(self) -> dict[str, float]:
-        """Stage -> about how long it is [s] of simulated time; the placement counts for 0.3 s.
+        """Stage -> about how long it is [s] of simulated time.
 
         Times of a preparation go with the root of 1 / g: dry rigid grains fall and come to rest in similar motions.
         """
-        placed = 0.0 if self.lowering_speed is None else 0.3
-        prepared = PREPARED * math.sqrt(STANDARD_GRAVITY / self.first_gravity)
-        return {self.bed_stage: prepared, self.stage: self.duration + placed}
+        recipe = recipe_of(self.material)
+        tapped = (self.graded is not None and recipe.rained is not None) if self.stages is None else any(
+            "compact" in stage for stage in self.stages
+        )  # fmt: skip
+        prepared = preparation_time(self.settings.bed_size[2], self.first_gravity, tapped=tapped) / self.repeats
+        return {self.bed_stage: prepared, self.stage: self.duration + self.placement_time}
+
+    def time_step(self) -> float:
+        """Of the grains [s]."""
+        s = self.settings
+        soft = self.material.softened(self.softening().young)
+        return time_step_for(soft, diameter=s.grain * (1 - s.spread), max_overlap=s.max_overlap)
+
+    @cached_property
+    def pace(self) -> float | None:
+        """Grain-steps a second that this machine made in earlier runs of about as many grains; None: not known."""
+        s: Any = self.settings
+        if s.ground == "lammps":
+            return None
+        threads = (s.threads or len(usable_cores())) if s.arch == "cpu" else 1  # as `dem.engine.runtime.start`
+        runtime = runtime_name(arch=s.arch, threads=threads)
+        return known_pace(runtime, grains=self.grain_count())
+
+    @property
+    def seconds_per_second(self) -> float | None:
+        """What a second of simulated time takes with all grains awake [s]; None: not known."""
+        return self.grain_count() / self.time_step() / self.pace if self.pace else None
 
     def carry_out(self, folder: RunFolder, progress: Progress) -> Result:
         """Prepare the bed and step the run in `folder`, from its checkpoint if there is one; returns the result."""
@@ -282,6 +313,7 @@ class PlatformOnBed(Followed[Run], Generic[Settings, Run, Expected]):
         if self.given_stages is None and self.stages is not None:
             progress.message(say("by_recipe", material=self.material, stages=" ".join(self.stages)))
         if self.plans:
-            progress.plan(self.costs, seconds={"report": self.report_seconds})
+            unit = None if self.settings.sleep else self.seconds_per_second
+            progress.plan(self.costs, seconds={"report": self.report_seconds}, unit=unit)
         self.kept = folder.load_checkpoint(CHECKPOINT)
         return self.finish(self.stepper(self.bed(self.softening(), progress)), folder, progress)

@@ -225,7 +225,13 @@ class AmendedLaw:
             if own.depth > _DEEPER * deepest
             else []
         )
-        return said + ([] if covered.get("withdrawal", True) else [say("way_out_unseen")])
+        return said + ([] if self.saw_withdrawal else [say("way_out_unseen")])
+
+    @property
+    def saw_withdrawal(self) -> bool:
+        """Whether a push that the model was fitted to came out again, as far as its file states it."""
+        covered = self.model.notes.get(RANGE_NOTE)
+        return not isinstance(covered, Mapping) or bool(covered.get("withdrawal", True))
 
     def _off_at_peaks(self) -> list[str]:
         """That the model was too low or too high at the deepest point of the pushes that it was fitted to."""

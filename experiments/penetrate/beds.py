@@ -14,7 +14,7 @@ from experiments.grains.bearing import STICKING, Bearing, bearing_of, sinks_past
 from experiments.grains.bed_progress import BedProgress
 from experiments.grains.recipes import recipe_of
 from experiments.grains.softening import Softening, bearing_gradient, drop_depth, soften_material, stable_overlap
-from experiments.grains.staged import come_to_rest, staged_bed
+from experiments.grains.staged import RAIN, come_to_rest, staged_bed
 from experiments.runs.progress import Progress
 from experiments.runs.stopping import held_back
 from experiments.runs.types import Json
@@ -22,7 +22,7 @@ from rigid.platform.rig import STANDARD_GRAVITY
 
 from .settings import PenetrateSettings, say
 from .similarity import pace_of
-from .units import RAIN, deepest
+from .units import deepest, rest_stage
 
 __all__ = [
     "bed_step", "choose_softness", "expected_bearing", "expected_stiffness", "find_material", "fingerprint",
@@ -85,7 +85,7 @@ def prepare_bed(settings: PenetrateSettings, seed: int, young: float, progress: 
         bed = staged_bed(stuff, stages, progress=progress, asked_to_stop=ending, name=name, **options)
     if first != settings.gravity:
         bed.set_gravity(settings.gravity)
-        progress.stage(say("comes_to_rest", seed=seed, gravity=settings.gravity), total=1.0)
+        progress.stage(rest_stage(settings, seed), total=1.0)
         come_to_rest(bed, unit=math.sqrt(settings.grain / first), progress=progress)
     return bed
 

@@ -24,7 +24,7 @@ from .amended import AmendedLaw, amended_numbers, kept_law, read_law, rest_of, r
 from .findings import mean_of, returned_work
 from .settings import PenetrateSettings, say
 from .sure.other_forms import kept_others
-from .sure.peak import peak_error, with_fit_errors
+from .sure.peak import peak_error, returned_std, with_fit_errors
 from .units import Unit, make_run, make_spike, plan_units
 
 __all__ = [
@@ -214,12 +214,13 @@ def run_without_bed(settings: PenetrateSettings, folder: RunFolder, progress: Pr
         compared = [say(which, law=law, plain=plain_stiffness)] if law.effects else []
         peaked = {name: plain[id] for name, id in _peaked(units).items()}
         errors = {name: peak_error(law, like) for name, like in peaked.items()}
+        returned = returned_std(law, list(peaked.values())) if law.saw_withdrawal else None
         made = Result.make(
             "penetrate",
             ground=settings.ground,
             version=__version__,
             title=f"A {settings.body_words} on the spring-damper, and with {law.words}",
-            quantities=with_fit_errors(quantities_of(found, std=None), law.own_errors, errors),
+            quantities=with_fit_errors(quantities_of(found, std=None), law.own_errors, errors, returned),
             runs=[_amended_entry(unit, plain[unit.id], runs[unit.id]) for unit in units],
             spike=asdict(make_spike(settings)) | {"load": settings.weight},
             model={"file": settings.model, "effects": list(law.effects), "other_forms": others.peaks(peaked)},

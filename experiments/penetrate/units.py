@@ -4,7 +4,6 @@ A piece is finished or it is not; what is finished is never computed again.
 """
 
 import math
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from statistics import fmean
@@ -12,18 +11,21 @@ from typing import Any, Literal
 
 from coupling import Drive, Drop, Run, SetDown
 from coupling.planar_body import PLACEMENT_TIME
+from dem.engine.runtime import usable_cores
+from experiments.grains import staged
 from experiments.grains.bearing import OF_PLATE
 from experiments.runs.folder import RunFolder
+from experiments.runs.pace import known_pace, runtime_name
 from experiments.runs.progress import Progress, as_expected
 from experiments.runs.types import Json
 from experiments.runs.whole_runs import PictureCosts
 from rigid import Spike
 
-from .settings import PenetrateSettings
+from .settings import PenetrateSettings, say
 from .similarity import pace_of
 
 __all__ = [
-    "RAIN", "PenetratePlan", "Unit", "deepest", "expected_time", "make_run", "make_spike", "plan_units",
+    "PenetratePlan", "Unit", "deepest", "expected_time", "make_run", "make_spike", "plan_units",
     "preparation_time",
 ]  # fmt: skip
 
@@ -158,12 +160,6 @@ def share_done(run: Run, expected: float, *, sure: bool = False) -> float:
     return min(1.0, passed) if sure else as_expected(passed)
 
 
-RAIN = 2.5
-"""Height of the loose column that a bed is rained from, over the bed's depth [1]."""
-PREPARATION = 1.6
-"""What a bed costs in falls from the top of the column that it is rained from, as steps of a bed at rest [1]."""
-TAPPED = 10.0
-"""How many times that, where it is tapped to a packing fraction: 15 taps from 0.571 to 0.600 [1]."""
 GRAIN_STEP = 1.5e-7
 """A first guess at what a grain takes in a step on two cores [s]; 366 s of runs on 20,187 grains took that."""
 FRAME = 40.0
@@ -176,9 +172,20 @@ def preparation_time(settings: PenetrateSettings, stages: Sequence[str] | None, 
     """About how long a bed takes to prepare in `stages` under a gravity [m/s2], on its clock [s]; 0: it is given."""
     if settings.bed is not None:
         return 0.0
-    fall = math.sqrt(2 * RAIN * settings.bed_size[2] / gravity)
     tapped = settings.packing is not None or any("compact" in stage for stage in stages or ())
-    return PREPARATION * (TAPPED if tapped else 1.0) * fall
+    return staged.preparation_time(settings.bed_size[2], gravity, tapped=tapped)
+
+
+def step_seconds(settings: PenetrateSettings) -> float:
+    """What a step of the bed takes on CPUs [s]: by earlier runs on this machine, else by `GRAIN_STEP`."""
+    threads = settings.threads or len(usable_cores())
+    pace = known_pace(runtime_name(arch="cpu", threads=threads), grains=settings.grain_count)
+    return settings.grain_count / pace if pace else GRAIN_STEP * settings.grain_count * 2 / min(threads, 8)
+
+
+def rest_stage(settings: PenetrateSettings, seed: int) -> str:
+    """What the progress calls the rest of a bed in the gravity of the run."""
+    return say("comes_to_rest", seed=seed, gravity=settings.gravity)
 
 
 class PenetratePlan:
@@ -202,12 +209,15 @@ class PenetratePlan:
             todo = [unit for unit in left if unit.seed == seed]
             if todo:
                 costs[_bed(seed)] = self._bed_cost()
+                if self._gravity != settings.gravity and settings.bed is None:
+                    rest = staged.rest_time(self._gravity, grain=settings.grain)
+                    costs[rest_stage(settings, seed)] = rest / step
             costs |= {unit.title: self._cost(unit) for unit in todo}
         grains = settings.grain_count
         count = settings.frame_count + 3  # with those of the deepest point and the end
         frames = {unit.id: count for unit in units if unit.id in self._shown} if settings.frame_count else {}
         report = PictureCosts(frames, grains).seconds
-        unit = GRAIN_STEP * grains * 2 / min(settings.threads or os.cpu_count() or 2, 8)
+        unit = step_seconds(settings)
         self.seconds = unit * sum(costs.values())
         """What beds and runs are expected to take on CPUs [s]."""
         seconds = {"spring-damper": SPRING_DAMPER, "report": report}

@@ -333,11 +333,14 @@ class _Told(Progress):
         super().__init__()
         self._tell, self._shown = tell, shown
 
-    def show_grains(self, *, grain_count: int, awake_count: int, grain_steps: int, slow_count: int = 0) -> None:
+    def show_grains(
+        self, *, grain_count: int, awake_count: int, grain_steps: int, slow_count: int = 0, runtime: str = ""
+    ) -> None:
         if self._shown is not None:
             self._shown.show_grains(
-                grain_count=grain_count, awake_count=awake_count, grain_steps=grain_steps, slow_count=slow_count
-            )
+                grain_count=grain_count, awake_count=awake_count, grain_steps=grain_steps, slow_count=slow_count,
+                runtime=runtime,
+            )  # fmt: skip
 
     def update(self, done: float) -> None:
         super().update(done)

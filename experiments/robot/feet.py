@@ -14,8 +14,8 @@ from . import say
 from .plan import RobotPlan
 
 __all__ = [
-    "FEW", "bounce_warning", "bounce_words", "crater_losses", "feet_quantities", "feet_reached", "heights_of",
-    "too_deep", "too_fast",
+    "FEW", "bounce_warning", "bounce_words", "buried_words", "crater_losses", "feet_quantities", "feet_reached",
+    "heights_of", "too_deep", "too_fast",
 ]  # fmt: skip
 
 FEW = 6  # Most feet whose numbers are quantities of their own
@@ -89,6 +89,17 @@ def bounce_warning(run: RobotRun, losses: dict[str, list[float]], law: str) -> l
     lossy = any(ground.retreat_damping > 0 for ground in run.ground.grounds[0])
     remedy = say("bounces_bed" if law == DAMPED or lossy else "bounces_damped", law=DAMPED)
     return [say("bounces", law=law, remedy=remedy, **most)]
+
+
+def buried_words(run: RobotRun, *, on: str | None = None) -> list[str]:
+    """A sentence where a geom that is fixed to a foot, and is none, went into the ground; none otherwise.
+
+    ``on``: name of the law of a run that only says what to expect on grains.
+    """
+    if not run.buried:
+        return []
+    key = "buried" if on is None else "buried_on_law"
+    return [say(key, name=run.buried.name, depth=1e3 * run.buried.depth, law=on)]
 
 
 def _most(losses: dict[str, list[float]]) -> dict[str, Any]:

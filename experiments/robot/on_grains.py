@@ -20,13 +20,12 @@ from coupling.robot import BedFeet, LammpsFeet, MujocoRobot, RobotRun, by_region
 from coupling.robot.soles import plan_area
 from coupling.robot.stability import ExpectedBed, check_exchange
 from dem import Bed
-from dem.contact.timestep import time_step_for
 from experiments.grains.bed_progress import Stages
 from experiments.grains.following import Followed
 from experiments.grains.lammps import check_lammps, moved_to_lammps
 from experiments.grains.on_bed import Forecast, PlatformOnBed
 from experiments.grains.softening import Softening, run_limit
-from experiments.grains.staged import LOWERED, lower_gravity
+from experiments.grains.staged import lower_gravity, lowering_time
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
 from experiments.runs.result import Result
@@ -35,6 +34,7 @@ from rigid.spatial.quaternions import to_matrix
 
 from . import say
 from .energy import idle
+from .feet import buried_words
 from .flight import fall_warning, touch_words
 from .forms import MOST_INERTIA, NO_FORMS, Forms, OnLaw, forms_of, with_grains
 from .on_laws import answer_of_run, follow_on, on_law
@@ -72,7 +72,7 @@ class RobotFollowed(Followed[RobotRun]):
 
     def __init__(self, settings: RobotSettings, plan: RobotPlan) -> None:
         self.settings, self.plan = settings, plan
-        self.weight, self._half_way = plan.numbers["weight"].value, False
+        self.weight, self._half_way, self._buried = plan.numbers["weight"].value, False, False
 
     def run_on_law(self, *, as_spring: bool = False) -> RobotRun:
         """The robot on its surface law, ready to be stepped; `as_spring`: explicitly, on the spring-damper."""
@@ -101,7 +101,10 @@ class RobotFollowed(Followed[RobotRun]):
         return super().finish(run, folder, progress)
 
     def notice(self, run: RobotRun) -> str | None:
-        """Once, half way: that the actuators have given no work."""
+        """Once: that what is fixed to a foot is in the ground; half way: that the actuators have given no work."""
+        if not self._buried and (said := buried_words(run)):
+            self._buried = True
+            return f"warning: {said[0]}"
         if self._half_way or run.fraction < 0.5:
             return None
         self._half_way = True
@@ -254,6 +257,8 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
         self._announce(self.told, progress)
         for sentence in self._softness():
             progress.message(sentence)
+        for sentence in buried_words(self.beside, on=self.settings.default_law):
+            progress.message(f"warning: {sentence}")
         if idle(self.plan, self.beside):
             law, time = self.settings.default_law, self.beside.time
             progress.message(f"warning: {say('idle_on_law', law=law, time=time)}")
@@ -272,14 +277,17 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
         return [own, *([f"warning: {say('young_soft', **words)}"] if softer else [])]
 
     def _work(self) -> str:
-        """Grains, steps and processor time of the run, its bed and its report, in a sentence."""
-        count, step = self.grain_count(), self._time_step()
-        beds = sum(cost for name, cost in self.costs.items() if name != self.stage)
-        run, bed = (count * time / step / (60e6 * PACE) for time in (self.duration, beds))
-        report = self.report_seconds / 60
-        words = {"minutes": run, "bed": bed, "report": report, "pace": PACE}
-        pictures = say("with_pictures" if self.settings.frame_count else "without_pictures")
-        return say("work", count=count, steps=self.duration / step, pictures=pictures, **words)
+        """Grains, steps and time of the run, its bed, the lowering of gravity and the report, in a sentence."""
+        count, step, pace = self.grain_count(), self.time_step(), self.pace
+        costs = {name: count * time / step / (60 * (pace or 1e6 * PACE)) for name, time in self.costs.items()}
+        words = {"minutes": costs[self.stage], "bed": costs[self.bed_stage], "pace": 1e-6 * pace if pace else PACE}
+        lowered = costs.get(self.lowering_stage)
+        return say(
+            "work", count=count, steps=self.duration / step, report=self.report_seconds / 60, **words,
+            pictures=say("with_pictures" if self.settings.frame_count else "without_pictures"),
+            of=say("as_measured" if pace else "of_one_core"), unit="" if pace else " of processor time",
+            lowered="" if lowered is None else say("lowered_takes", minutes=lowered),
+        )  # fmt: skip
 
     @property
     def report_seconds(self) -> float:  # type: ignore[override]
@@ -292,14 +300,9 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
         found = dict(super().costs)
         run = found.pop(self.stage)
         if self.first_gravity != self.gravity:
-            found[self.lowering_stage] = LOWERED * math.sqrt(self.settings.grain / self.first_gravity)
+            grain = self.settings.grain
+            found[self.lowering_stage] = lowering_time(self.first_gravity, self.gravity, grain=grain)
         return found | {self.stage: run}
-
-    def _time_step(self) -> float:
-        """Of the grains [s]."""
-        s = self.settings
-        grains = self.material.softened(self.softening().young)
-        return time_step_for(grains, diameter=s.grain * (1 - s.spread), max_overlap=s.max_overlap)
 
     def check_exchange(self) -> float:
         """The load of the exchange at the start over the largest stable one [1], on the expected bed.
@@ -308,7 +311,7 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
         """
         s, robot = self.settings, self.plan.robot()
         grains = self.material.softened(self.softening().young)
-        step = self._time_step()
+        step = self.time_step()
         robot.start()
         bed = ExpectedBed(0.5 * s.grain, run_limit(s.max_overlap), grains, step, repeatable=s.ground != "lammps")
         return check_exchange(robot, bed, substeps=s.substeps, iterations=s.iterations)
@@ -366,8 +369,10 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
             way = high - low
             need = way + 2 * s.grain
             if s.bed_size[axis] < need:
-                words = {"size": s.bed_size[axis], "low": low, "high": high, "wanted": math.ceil(100 * need) / 100}
-                faults.append(say("too_short", s=s, name=name, **words))
+                why = "" if s.default_law == "spring-damper" else say("why_spring", law=s.default_law)
+                words = {"low": low, "high": high, "wanted": math.ceil(100 * need) / 100}
+                said = say("too_short", s=s, name=name, size=s.bed_size[axis], why=why, **words)
+                faults.append(said)
                 need += SPARE * way
             sizes[axis] = max(s.bed_size[axis], math.ceil(100 * max(need, wide) - 1e-6) / 100)
         deepest, on = self.depth_expected

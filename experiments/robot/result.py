@@ -27,6 +27,7 @@ from .energy import MOST_RESIDUAL, balance_warning, idle
 from .feet import (
     bounce_warning,
     bounce_words,
+    buried_words,
     crater_losses,
     feet_quantities,
     feet_reached,
@@ -181,8 +182,9 @@ def conclude(
         say("idle", time=run.time) if idle(plan, run) else None,
         *plan.warnings_of_run, balance_warning(settings, run), grains.unsettled_warning(run.master),
         say("unstable", load=run.load, most=run.most_load) if run.load > run.most_load else None,
+        *buried_words(run),
         say("went_below", name=run.lowest_other[1], depth=-1e3 * run.lowest_other[0])
-        if run.lowest_other[0] < -BELOW else None,
+        if run.lowest_other[0] < -BELOW and run.lowest_other[1] != run.buried.name else None,
         _cut_off(run, heights, flights) if flights.at_end else None, pushes_off(run, flights),
         *bounce_warning(run, crater_losses(run, heights, apart=APART), plan.law),
         *(too_deep(run, plan.law) if plan.fitted is None else []),
@@ -217,9 +219,7 @@ def conclude(
             "beside_duration": beside.time,
         }  # fmt: skip
         sentences.append(say("modulus", young=1e-6 * softening.young, factor=softening.factor))
-        if settings.sleep:
-            done, awake = (result["grains"][key] for key in ("grain_steps", "grain_steps_all_awake"))
-            sentences.append(say("slept", share=done / awake))
+        sentences += grains.sleep_words(settings, run, bed)
         warnings += [
             grains.reversal_warning(run.dissipation_reversal),
             grains.sides_warning(bed),

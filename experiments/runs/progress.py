@@ -27,6 +27,8 @@ from rich.progress import BarColumn, ProgressColumn, Task, TaskID, TextColumn
 from rich.progress import Progress as Bars
 from rich.text import Text
 
+from .pace import PaceMeter
+
 __all__ = ["LineProgress", "LiveProgress", "Progress", "as_expected", "duration", "make_progress"]
 
 
@@ -117,6 +119,7 @@ class Progress(AbstractContextManager["Progress"]):
 
     def __init__(self, *, clock: Callable[[], float] = time.monotonic):
         self._clock, self._began = clock, clock()
+        self.meter = PaceMeter()
         self.stage_name = ""
         self._total: float | None = None
         self._done = 0.0
@@ -163,6 +166,7 @@ class Progress(AbstractContextManager["Progress"]):
         self._pace = _Pace(self._clock())
         self._bed = None
         self._worked.clear()
+        self.meter.leave()
         if name in self._costs or name in self._seconds:
             self._end_stage()
             self._open, self._opened = name, self._pace
@@ -178,10 +182,13 @@ class Progress(AbstractContextManager["Progress"]):
         if self._opened is not self._pace and self._opened.first is None:
             self._opened.report(now, 0.0)  # something is done within it
 
-    def show_grains(self, *, grain_count: int, awake_count: int, grain_steps: int, slow_count: int = 0) -> None:
+    def show_grains(
+        self, *, grain_count: int, awake_count: int, grain_steps: int, slow_count: int = 0, runtime: str = ""
+    ) -> None:
         """Say of the stage's bed how many grains it has, how many are awake, how many grain-steps it has done in all.
 
-        ``slow_count``: how many of those awake are computed once in several steps.
+        ``slow_count``: how many of those awake are computed once in several steps. ``runtime``: what computes them
+        (`experiments.runs.pace.runtime_name`); without it their pace is not kept for later runs.
 
         Before `update`, which shows it; the end of the stage ends it.
         """
@@ -191,6 +198,8 @@ class Progress(AbstractContextManager["Progress"]):
         while len(self._worked) > 1 and now - self._worked[1][0] >= _RECENT:
             self._worked.popleft()
         self._bed = (grain_count, awake_count, slow_count)
+        if runtime:
+            self.meter.read(now, grain_steps=float(grain_steps), awake=awake_count, runtime=runtime)
         self._worked.append((now, float(grain_steps)))
 
     @property
@@ -212,8 +221,9 @@ class Progress(AbstractContextManager["Progress"]):
         """Show the user a message: a warning, a finding."""
 
     def close(self) -> None:
-        """End the last stage and tidy up. Called by `with`."""
+        """End the last stage and tidy up, and keep the machine's pace. Called by `with`."""
         self._end_stage()
+        self.meter.keep()
         self.stage_name = ""
 
     def _end_stage(self) -> None:

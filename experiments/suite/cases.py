@@ -96,7 +96,7 @@ def cost_of_tumble(settings: TumbleSettings) -> Cost:
     from coupling.lowered_gravity import EFOLD, pace_under
     from coupling.platform_run import REST_TIME
     from dem.contact.timestep import time_step_for
-    from experiments.grains.on_bed import RAIN
+    from experiments.grains.staged import RAIN
     from experiments.tumble.on_grains import PlanarOnBed
 
     on_bed = PlanarOnBed(settings)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm, t
 
-from rigid.intervals import NORMAL, half_width, student
+from rigid.intervals import NORMAL, half_of, half_width, student
 
 
 @pytest.mark.parametrize(("freedom", "printed"), [(1, 12.706), (2, 4.303), (4, 2.776), (10, 2.228), (30, 2.042)])
@@ -30,3 +30,9 @@ def test_one_value_shows_no_scatter_and_several_have_t_s_over_root_n():
     assert half_width(float(np.std(values, ddof=1)), 3) == pytest.approx(
         4.3027 * math.sqrt(7 / 3) / math.sqrt(3), rel=1e-4
     )
+
+
+def test_a_fitted_number_has_a_normal_interval_and_students_where_its_freedom_is_known():
+    assert half_of({"std": 2.0}) == pytest.approx(3.92)
+    assert half_of({"std": 2.0, "freedom": 2}) == pytest.approx(8.606, abs=1e-3)
+    assert half_of({"std": None, "freedom": 2}) is None and half_of({}) is None

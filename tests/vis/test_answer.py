@@ -307,14 +307,14 @@ def test_errors_that_no_row_of_a_bed_knows_are_named_below_the_table():
     assert all(name in shown.notes[0] for name in ("grain size", "softness"))
 
 
-def test_a_fitted_number_has_its_standard_error_or_why_it_has_none():
+def test_a_fitted_number_has_its_interval_or_why_it_has_none():
     result = read_result(KEPT / "diagnose-grains" / "result.json")
     shown = headline_of(EXPERIMENTS["diagnose"], result)
     rows = {row[0]: row[1:] for row in shown.rows}
-    assert "standard error" in shown.head[2]
-    assert rows["Crater share (plastic-sinkage)"] == ("0.955", "0.019")
+    assert shown.head[2].endswith("(95\N{NO-BREAK SPACE}%)")
+    assert rows["Crater share (plastic-sinkage)"] == ("0.96", "0.04")  # 1.96 standard errors of 0.0195
     assert rows["Crater bend (plastic-sinkage)"] == ("2.50", "end of range")
-    assert rows["Stiffness"] == ("39.3 N/m", "2.2 N/m")
+    assert rows["Stiffness"] == ("39 N/m", "4 N/m")
 
 
 def test_a_comparison_has_both_numbers_their_spreads_and_the_difference():

@@ -9,6 +9,7 @@ import pytest
 from matplotlib.colors import to_rgb
 from matplotlib.text import Annotation
 
+from rigid.intervals import half_of
 from vis.diagnose.campaign import _draw_coverage, _has_holes, _widths
 from vis.diagnose.evidence import closed_share, draw_evidence
 from vis.diagnose.figures import (
@@ -22,6 +23,7 @@ from vis.diagnose.figures import (
     worst,
 )
 from vis.diagnose.report import write_diagnosis_report
+from vis.diagnose.usable import gap_in_scatter
 from vis.page.plots import line_handles, line_styles
 
 
@@ -81,9 +83,9 @@ def test_what_replicates_differ_by_stands_beside_the_gap_and_behind_what_is_left
     write_folder(tmp_path, trials={"a": 3.0, "d": 2.0}, scatter=0.2)
     page = write_diagnosis_report(tmp_path).read_text(encoding="utf-8")
     for part in (
-        "after, held-out trials, with the scatter",
+        "Gap with scatter after, held-out trials",
         "<td>1.5",
-        "replicates&#39; scatter added",
+        "best model, gap with scatter",
         "Certain: nothing.",
     ):
         assert part in page or part.replace("&#39;", "'") in page
@@ -277,3 +279,15 @@ def test_a_deeper_push_has_a_thicker_line_that_shallower_ones_do_not_hide():
     widths = _widths(files, trials)
     assert widths["a"] < widths["b"] == widths["c"]
     assert _widths(files, trials[:1]) == {"a": widths["a"]}
+
+
+def test_a_gap_over_few_trials_has_students_interval_and_the_table_has_95_percent(tmp_path):
+    """Four held-out trials: t = 3.18 with three degrees of freedom (printed tables)."""
+    weighed = {"before": {"fit": 3.4, "held_out": 2.2}, "after": {"fit": 1.0, "held_out": 1.1},
+               "after_std": {"fit": 0.6, "held_out": 0.6}, "trials": {"fit": 9, "held_out": 4}}  # fmt: skip
+    assert half_of(gap_in_scatter({"gap_with_scatter": weighed}, "held_out")) == pytest.approx(3.182 * 0.6, abs=1e-3)
+    assert half_of(gap_in_scatter({"gap_with_scatter": weighed | {"trials": {}}}, "fit")) == pytest.approx(1.96 * 0.6)
+    assert half_of(gap_in_scatter({"gap_with_scatter": weighed}, "fit", "before")) is None
+    write_folder(tmp_path, trials={"a": 3.0, "d": 2.0}, scatter=0.2)
+    page = write_diagnosis_report(tmp_path).read_text(encoding="utf-8")
+    assert "standard error" not in page.replace("1.96 standard errors", "")

@@ -5,7 +5,19 @@ import math
 import numpy as np
 import pytest
 
-from vis.page.numbers import beside, between, column, in_one_unit, plain, quantity, quote, scale_of, typeset, within
+from vis.page.numbers import (
+    beside,
+    between,
+    column,
+    fitted,
+    in_one_unit,
+    plain,
+    quantity,
+    quote,
+    scale_of,
+    typeset,
+    within,
+)
 from vis.sweep.report import on_axis
 
 SPACE = "\N{NO-BREAK SPACE}"
@@ -45,6 +57,13 @@ def test_a_number_smaller_than_its_error_is_not_shown_as_zero():
     assert beside(0.3749, 2.387) == "0.4" and beside(-0.3749, 2.387) == "-0.4"
     assert beside(299.3846, 0.3695) == "299.4" and beside(4.068, 0.026) == "4.068"
     assert beside(0.3749, None) == "0.3749" and beside(0.0, 2.4) == "0.0"
+
+
+def test_a_fitted_number_is_quoted_with_half_of_its_95_percent_interval():
+    entry = {"value": 722.3, "std": 10.7, "unit": "N/m", "note": "error of the fit"}
+    assert fitted(entry) == quote(722.3, 1.96 * 10.7, "N/m")
+    assert fitted(entry | {"freedom": 2}) == quote(722.3, 4.3027 * 10.7, "N/m")
+    assert fitted(entry | {"std": None}, significant=4) == quote(722.3, None, "N/m", significant=4)
 
 
 def test_quantity_takes_what_result_json_holds():

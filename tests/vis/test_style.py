@@ -1,7 +1,7 @@
 """Ways of a platform, drawn in their true shape where something of it can be seen; colours of its states."""
 
 from dataclasses import replace
-from itertools import combinations
+from itertools import combinations, pairwise
 
 import numpy as np
 import pytest
@@ -14,11 +14,28 @@ from vis.compare.report import _draw_path
 from vis.diagnose.evidence import _KINDS
 from vis.diagnose.figures import _PHASES, BASE
 from vis.page.folder import read_folder
-from vis.page.plots import AMENDED, BED, MODEL, STATES, as_it_lies, handle, legend_above, new_figure, title_above
+from vis.page.plots import (
+    AMENDED,
+    BED,
+    MODEL,
+    STATES,
+    as_it_lies,
+    handle,
+    legend_above,
+    new_figure,
+    styled,
+    title_above,
+)
+from vis.page.states import draw_forces
 from vis.penetrate.lawfit import _over_beds
 from vis.penetrate.plot_drag import OVER_BEDS, by_speed
 from vis.penetrate.report import PLOTS
 from vis.pictures.render import write_gif
+from vis.robot.beds import draw_beside
+from vis.robot.report import _draw_ground, _draw_joints
+from vis.robot.report import _draw_path as path_of_robot
+from vis.spatial.report import _draw_path as path_in_space
+from vis.spatial.report import draw_energy
 
 
 @pytest.mark.parametrize(("length", "aspect", "title"), [(0.3, 1.0, ""), (2.0, "auto", "heights stretched")])
@@ -199,3 +216,60 @@ def test_a_legend_too_wide_for_its_figure_goes_on_below(columns: int | None) -> 
     figure.draw_without_rendering()
     box = figure.legends[0].get_window_extent()
     assert box.x0 >= 0 and box.x1 <= figure.bbox.width
+
+
+# Curves of robots and platforms in space
+
+
+def columns(duration: float) -> dict[str, np.ndarray]:
+    """Series of a robot and of a platform."""
+    time = np.linspace(0.0, duration, 400)
+    names = [
+        *(f"{axis}_m" for axis in "xyz"), *(f"v{axis}_m_s" for axis in "xyz"), *(f"f{axis}_N" for axis in "xyz"),
+        "kinetic_J", "potential_J", "torque_work_J", "taken_J", "sinkage_m", "foot_depth_m", "foot_height_m",
+        "heel_depth_m", "heel_height_m", "knee_rad", "knee_rad_s", "rail_m", "rail_m_s", "push_control", "push_force",
+        "fz_N_1", "fz_N_2",
+    ]  # fmt: skip
+    return {"t_s": time} | {name: np.sin((k + 1) * time / duration) for k, name in enumerate(names)}
+
+
+FIGURES = {
+    "path": lambda rows: path_of_robot(rows, rows),
+    "ground": lambda rows: _draw_ground(rows, rows, ["foot", "heel"]),
+    "joints": _draw_joints,
+    "beside": lambda rows: draw_beside([rows], rows, "rft", called="grains"),
+    "energy": draw_energy,
+    "path in space": path_in_space,
+    "forces of two": lambda rows: draw_forces([1.0, 1.0], rows, {"fz_N": "upwards [N]"}, ["one", "other"]),
+}
+
+
+def colours_named(drawing: Figure) -> set[str]:
+    """Colours of the lines in the legends."""
+    every = [*drawing.legends, *(axis.get_legend() for axis in drawing.axes)]
+    return {line.get_color() for one in every if one for line in one.get_lines()}
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_every_curve_of_a_panel_with_several_is_in_a_legend(name: str) -> None:
+    with styled():
+        drawing = FIGURES[name](columns(0.7))
+        drawing.draw_without_rendering()
+    named = colours_named(drawing)
+    for axis in drawing.axes:
+        if len(axis.lines) > 1:
+            assert {line.get_color() for line in axis.lines} <= named, axis.get_ylabel()
+
+
+@pytest.mark.parametrize("duration", [0.02, 0.7, 30.0])
+@pytest.mark.parametrize("name", FIGURES)
+def test_labels_of_the_time_lie_beside_one_another_and_no_axis_is_shorter_than_its_label(name: str, duration: float):
+    with styled():
+        drawing = FIGURES[name](columns(duration))
+        drawing.draw_without_rendering()
+    for axis in drawing.axes:
+        low, high = axis.get_xlim()
+        shown = [tick for tick in axis.xaxis.get_major_ticks() if low <= tick.get_loc() <= high]
+        for one, other in pairwise(tick.label1.get_window_extent() for tick in shown):
+            assert one.x1 < other.x0
+        assert axis.yaxis.label.get_window_extent().height <= axis.get_window_extent().height

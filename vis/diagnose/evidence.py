@@ -121,7 +121,7 @@ def _draw_left(axis: Axes, rows: Sequence[Result], colours: Sequence[str], diagn
             axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
             axis.xaxis.set_minor_locator(NullLocator())
     noise = "noise and replicates" if base.get("with_scatter") else "noise"
-    axis.set_xlabel(f"chi-square per sample left\n(1: {noise}; %: gap closed)")
+    axis.set_xlabel(f"chi-square per sample left\n(1: {noise}; %: excess removed)")
     axis.grid(False, axis="y")
 
 

@@ -6,6 +6,7 @@ import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from rigid.intervals import half_of
 from vis.diagnose.evidence import closed_share, draw_evidence
 from vis.diagnose.figures import (
     draw_latent,
@@ -16,9 +17,9 @@ from vis.diagnose.figures import (
     trials_of,
     worst,
 )
-from vis.diagnose.usable import has_numbers_to_use, stiffness_words
+from vis.diagnose.usable import gap_in_scatter, has_numbers_to_use, stiffness_words
 from vis.page.answer import MOST_ROWS
-from vis.page.numbers import beside, plain, quote, short, within
+from vis.page.numbers import beside, fitted, plain, quote, short, within
 from vis.page.page import Block, Section, Tile, listing, table, table_of, text
 from vis.page.report import Report, Result, again, capital, report_of, unit_text
 from vis.page.sentences import Sentences
@@ -72,19 +73,19 @@ def answer_tiles(result: Result) -> list[Tile]:
         for stage in _STAGES
     ]
     if weighed := numbers.get(f"gap_with_scatter_after_{part}"):
-        tiles.append(Tile(say("gap_scatter", where=where), quote(weighed["value"], weighed["std"]), which))
-    fitted = [name for name in numbers if "." in name] + [name for name in numbers if name.endswith("_after")]
-    tiles += [_tile_of(name, numbers[name]) for name in fitted]
+        tiles.append(Tile(say("gap_scatter", where=where), fitted(weighed), which))
+    named = [name for name in numbers if "." in name] + [name for name in numbers if name.endswith("_after")]
+    tiles += [_tile_of(name, numbers[name]) for name in named]
     return tiles[:MOST_ROWS]
 
 
 def _tile_of(name: str, entry: Result) -> Tile:
-    """A fitted number with its standard error, or why it has none."""
+    """A fitted number with half of its 95 % interval, or why it has none."""
     effect, _, own = name.rpartition(".")
     label = capital(own.removesuffix("_after").replace("_", " ")) + (f" ({effect})" if effect else "")
-    note, unit = str(entry.get("note", "")), entry["unit"]
+    note, unit = str(entry.get("note", "")).replace("standard error of the fit", "error of the fit"), entry["unit"]
     if entry["std"]:
-        return Tile(label, quote(entry["value"], entry["std"], unit), note)
+        return Tile(label, fitted(entry), note)
     why = say("at_the_end" if "end of its range" in note else "not_determined")
     value = quote(entry["value"], None, unit)
     if "at_most" in entry:
@@ -140,13 +141,13 @@ def _gap_table(diagnosis: Result) -> Block:
         cells = [name]
         for one in (gap, weighed) if weighed is not None else (gap,):
             cells += [_DASH if one[stage][part] is None else _number(one[stage][part]) for stage in ("before", "after")]
-            error = one.get("after_std", {}).get(part)
-            cells[-1] += "" if error is None else f" ± {short(error, 2)}"
+            if weighed is not None and one is weighed and one["after"][part] is not None:
+                cells[-1] = fitted(gap_in_scatter(diagnosis, part))
         rows.append(cells)
     head: tuple[str, ...] = ("", "base model", "best model")
     title = "The gap, chi-square per sample (1: the sensors' noise)"
     if weighed is not None:
-        head += ("base model, replicates' scatter added", "best model, replicates' scatter added")
+        head += ("base model, gap with scatter", "best model, gap with scatter")
         title += say("with_scatter")
         freedom = weighed.get("freedom")
         title += f"; their scatter has {freedom} degrees of freedom)" if freedom else ")"
@@ -175,7 +176,7 @@ def _in_units(diagnosis: Result) -> list[Block]:
         common = _common([row["settings"] for row in conditions])
         lines = [(_settings(row["settings"], but=common), ", ".join(row["trials"]), _number(row["before"]),
                   _number(row["after"])) for row in conditions]  # fmt: skip
-        title = "Chi-square per sample by condition" + (f" ({_settings(common)} in all)" if common else "")
+        title = "Gap by condition" + (f" ({_settings(common)} in all)" if common else "")
         blocks.append(table(("condition", "trials", "before", "after"), lines, title=title))
     return blocks
 
@@ -193,7 +194,7 @@ def _phase_table(diagnosis: Result) -> list[Block]:
 
     head = ("phase", "channel", "samples fitted", "before", "after", "samples held out", "before", "after")
     body = [(*key, *cells(parts.get(False)), *cells(parts.get(True))) for key, parts in rows.items()]
-    return table_of(head, body, title="Chi-square per sample by phase and channel")
+    return table_of(head, body, title="Gap by phase and channel")
 
 
 def _set_aside(diagnosis: Result) -> list[Block]:
@@ -267,14 +268,24 @@ def _evidence(diagnosis: Result) -> list[Block]:
     worse = [" + ".join(row["effects"]) for row in rows if not row["better"]]
     blocks: list[Block] = []
     if better:
-        head = ("candidate (effect:form)", "evidence over the base model [nats]", "chi-square a sample beyond noise",
-                "of the gap closed", "forms tried", "what became of it")  # fmt: skip
+        head = ("candidate (effect:form)", "evidence over the base model [nats]", "excess", "excess removed",
+                "forms tried", "what became of it")  # fmt: skip
         title = "One line for each set of names, in its best form; the most likely first"
         blocks.append(table(head, better, title=title, words=True))
+        blocks += _forms(diagnosis, [row[0] for row in better])
     if worse:
         blocks.append(text(say("worse", names=", ".join(worse))))
     blocks.append(text(say("searched"), small=True))
     return blocks
+
+
+def _forms(diagnosis: Result, candidates: Sequence[str]) -> list[Block]:
+    """What the forms of these candidates are."""
+    meanings = diagnosis.get("forms", {})
+    shown = [
+        id for id in meanings if any(id.partition(":")[2] in one and id.partition(":")[0] in one for one in candidates)
+    ]
+    return [text(say("forms"), small=True), listing([f"{id}: {meanings[id]}" for id in shown])] if shown else []
 
 
 def _sizes(diagnosis: Result) -> list[Block]:
@@ -289,25 +300,27 @@ def _sizes(diagnosis: Result) -> list[Block]:
 
 
 def _value(entry: Result) -> str:
-    """A number beside its standard error, with the digits that the terminal shows; of C that is not determined its
-    upper bound."""
+    """A number beside half of its 95 % interval, with the digits that the terminal shows; of C that is not determined
+    its upper bound."""
     if "at_most" in entry:
         return say("below", bound=short(entry["at_most"], 2))
-    return beside(entry["value"], entry["std"]).replace("-", "\N{MINUS SIGN}")
+    return beside(entry["value"], half_of(entry)).replace("-", "\N{MINUS SIGN}")
 
 
 def _error(diagnosis: Result, entry: Result, name: str, stage: str) -> str:
-    """The standard error of a number, or why it has none."""
+    """Half of the 95 % interval of a number, or why it has none."""
     if "at_most" in entry:
         return say("not_determined")
     if any(bound["parameter"] == name and bound["at_bound"] for bound in diagnosis.get("at_bounds", {}).get(stage, [])):
         return "at its end"
-    lost = entry["std"] is None or not entry.get("determined", True)
-    return say("not_determined") if lost else short(entry["std"], 2)
+    half = half_of(entry) if entry.get("determined", True) else None
+    if half is None:
+        return say("not_determined")
+    return short(half, 2) if abs(entry["value"]) < half else beside(half, half)
 
 
 def _effects(diagnosis: Result) -> list[tuple[str, str, str, str, str]]:
-    """A row for each parameter of the effects that were added: effect, parameter, value, standard error, unit."""
+    """A row for each parameter of the effects that were added: effect, parameter, value, half of its interval, unit."""
     return [
         (effect["id"], name, _value(entry), _error(diagnosis, entry, f"{effect['id']}.{name}", "after"),
          unit_text(entry["unit"]))
@@ -325,7 +338,7 @@ def _to_use(diagnosis: Result) -> list[Block]:
          _error(diagnosis, entry, name, "after"), unit_text(entry["unit"]))
         for name, entry in diagnosis["base"]["after"].items()
     ] + [(f"{effect} {name}", *numbers) for effect, name, *numbers in _effects(diagnosis)]  # fmt: skip
-    return table_of(("number to use", "value", "standard error (random)", "unit"), rows, title=say("to_use"))
+    return table_of(("number to use", "value", say("in_95"), "unit"), rows, title=say("to_use"))
 
 
 def _numbers(diagnosis: Result) -> list[Block]:
@@ -338,11 +351,11 @@ def _numbers(diagnosis: Result) -> list[Block]:
          _error(diagnosis, after[name], name, "after"), unit_text(entry["unit"]))
         for name, entry in diagnosis["base"]["before"].items() if name in after
     ]  # fmt: skip
-    added = table_of(("effect", "parameter", "value", "standard error", "unit"), effects, title="Added effects")
-    head = ("parameter", "before", "standard error", "after", "standard error", "unit")
+    added = table_of(("effect", "parameter", "value", say("in_95"), "unit"), effects, title="Added effects")
+    head = ("parameter", "before", say("in_95"), "after", say("in_95"), "unit")
     fitted = table_of(head, base, title="The base model's parameters")
     blocks = [*_sizes(diagnosis), *added, *_equations(diagnosis), *fitted] if effects else fitted
-    return [*blocks, text(say("standard_errors"), small=True)] if blocks else []
+    return [*blocks, text(say("errors_of_fit"), small=True)] if blocks else []
 
 
 def _equations(diagnosis: Result) -> list[Block]:

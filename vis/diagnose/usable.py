@@ -3,9 +3,18 @@
 from collections.abc import Mapping
 from typing import Any
 
-__all__ = ["has_numbers_to_use", "secant_depth", "stiffness_words"]
+__all__ = ["gap_in_scatter", "has_numbers_to_use", "secant_depth", "stiffness_words"]
 
 _OF_POWER = "K * z * (z / D)^"  # how an equation begins in which K is F / z at z = D alone
+
+
+def gap_in_scatter(diagnosis: Mapping[str, Any], part: str, stage: str = "after") -> dict[str, Any]:
+    """The gap with the scatter of replicates of a diagnosis as a fitted number: its standard error is a jackknife over
+    trials, so it has one degree of freedom less than there are trials. ``part``: "fit" or "held_out"."""
+    weighed = diagnosis["gap_with_scatter"]
+    trials = weighed.get("trials", {}).get(part)
+    freedom = {} if trials is None or trials < 2 else {"freedom": trials - 1}
+    return {"value": weighed[stage][part], "std": weighed.get(f"{stage}_std", {}).get(part), "unit": "1", **freedom}
 
 
 def has_numbers_to_use(diagnosis: Mapping[str, Any]) -> bool:

@@ -14,11 +14,14 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from rigid.intervals import half_of
+
 __all__ = [
     "beside",
     "between",
     "column",
     "digits_for",
+    "fitted",
     "foldable",
     "in_one_unit",
     "in_two_digits",
@@ -142,6 +145,15 @@ def quote(value: float | None, std: float | None = None, unit: str = "1", *, sig
         decimals = digits_for(std / scale) if abs(value) >= std else _two_digits(std / scale)
         text = f"{_fixed(value / scale, decimals)}{_SPACE}±{_SPACE}{_fixed(std / scale, decimals)}"
     return f"{text}{_SPACE}{shown}" if shown else text
+
+
+def fitted(entry: Mapping[str, Any], *, significant: int = 3) -> str:
+    """A fitted number with half of its 95 % interval and its unit.
+
+    ``entry``: `{"value", "std", "unit"}` with the standard error ``std``, None where there is none, and maybe its
+    ``freedom`` (`rigid.intervals.half_of`). ``significant``: Digits where no error sets them.
+    """
+    return quote(entry["value"], half_of(entry), str(entry.get("unit") or "1"), significant=significant)
 
 
 def between(low: float, high: float, unit: str) -> str:

@@ -31,6 +31,7 @@ LINES: tuple[Mapping[str, Any], Mapping[str, Any]] = (
     {"color": MODEL, "lw": 1.4, "ls": (0, (4, 2))},
 )
 """Of the first of two runs and of the second, which is dashed as well."""
+_OF_WEIGHT = (0, (5, 4))
 _LABEL = 26
 """Letters of a run's label in a line."""
 _LETTER = 0.0063
@@ -73,8 +74,8 @@ def draw_forces(
                 axis.plot(columns["t_s"], columns[f"{name}_{number}"], **{**style, "lw": 1.1})
         axis.set(ylabel=words, xlabel="time [s]")
     for weight, style in zip(weights, LINES, strict=True):
-        axes[0].axhline(weight, color=INK if weights[0] == weights[1] else style["color"], lw=0.8, ls=(0, (5, 4)))
-    legend_of_runs(drawing, labels)
+        axes[0].axhline(weight, color=INK if weights[0] == weights[1] else style["color"], lw=0.8, ls=_OF_WEIGHT)
+    legend_of_runs(drawing, labels, [handle("weight", INK, lw=0.8, ls=_OF_WEIGHT)], columns=3)
     return drawing
 
 

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from rigid.intervals import half_width
+from rigid.intervals import half_of, half_width
 from vis.page.numbers import between, plain, quantity, quote, split_spread, within
 from vis.page.page import Tile
 from vis.penetrate import summary_parts as words
-from vis.penetrate.errors import contains_beds, half_of, in_95
+from vis.penetrate.errors import contains_beds, in_95
 from vis.penetrate.summary_parts import NBSP, say
 
 __all__ = ["answer_tiles", "grains_of", "largest_force", "peaks_of", "rests_at", "words_of_effects"]

@@ -10,11 +10,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from rigid.intervals import NORMAL, half_width, student
+from rigid.intervals import half_of, half_width, student
 from vis.page.numbers import between, quantity, quote
 from vis.penetrate.summary_parts import fit_error, joined, list_of, mapping_of, say, std_of, value_of
 
-__all__ = ["contains_beds", "error_words", "fit_part", "fitted", "half_of", "half_of_fit", "in_95"]
+__all__ = ["contains_beds", "error_words", "fit_part", "fitted", "half_of_fit", "in_95"]
 
 _UNITS = {"stiffness": "N/m", "damping": "N s/m"}
 
@@ -43,13 +43,6 @@ def in_95(result: Mapping[str, Any]) -> dict[str, Any]:
         if (error := value_of(quantities, f"{key}_error")) is not None:
             found[f"{key}_error"]["value"] = _of_runs(error, _run_count(result, fits[0] if len(fits) == 1 else {}))
     return found
-
-
-def half_of(entry: Mapping[str, Any]) -> float | None:
-    """Half of the 95 % interval of a model's number: Student's where its `freedom` is known, else that of the normal
-    distribution; None for a number without a standard error."""
-    std, freedom = entry.get("std"), entry.get("freedom")
-    return None if std is None else (NORMAL if freedom is None else student(freedom)) * std
 
 
 def error_words(result: Mapping[str, Any]) -> str:

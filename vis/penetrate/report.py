@@ -16,6 +16,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
+from rigid.intervals import half_of
 from vis.page.answer import answer
 from vis.page.folder import Run, RunFolder, Series, from_python, read_folder
 from vis.page.limits import limits_words
@@ -24,7 +25,7 @@ from vis.page.page import Block, Section, Tile, figure, table, text, write_templ
 from vis.page.plots import AMENDED, BED, DASHED, GREY, MODEL, handle, legend_above, sheet, styled, title_above
 from vis.page.report import Progress, Report, again, report_of, title_of
 from vis.penetrate.answer import answer_tiles, words_of_effects
-from vis.penetrate.errors import error_words, half_of
+from vis.penetrate.errors import error_words
 from vis.penetrate.plot_drag import Plot, drag_plot, gap_plot, work_plot
 from vis.penetrate.plot_drops import drop_peaks_plot, drops_plot, set_down_plot, spread_plot
 from vis.penetrate.summary import summarise
@@ -237,11 +238,11 @@ def _write_law_report(report: Report) -> Path:
     key = "law" if of_file else "amended"
     blocks = [text("There is nothing to draw.")] if drawing is None else [report.draw(key, drawing, shown=_shown(run))]
     rows = [
-        (name.replace("_", " "), quote(entry["value"], entry["std"], entry["unit"]), str(entry.get("note", "")))
+        (name.replace("_", " "), quote(entry["value"], half_of(entry), entry["unit"]), str(entry.get("note", "")))
         for name, entry in numbers.items()
     ]
-    head = "value" if of_file else "value ± standard error"
-    meant = [] if of_file else [text(f"At the top, {error_words(report.result)}", small=True)]
+    head = say("value_in_95")
+    meant = [] if of_file else [text(error_words(report.result), small=True)]
     whose = f"no bed: the law of {'a ground file' if of_file else 'the model'} only"
     sections = [
         Section("", blocks),

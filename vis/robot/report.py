@@ -89,15 +89,16 @@ def _feet(reached: Mapping[str, Mapping[str, float]]) -> list[Section]:
 
 def _draw_path(motion: Columns, feet: Columns) -> Figure:
     """Path of the centre of mass, along the axes in which it moves, and the height of the lowest foot."""
-    drawing, way, low = pair("displacement of the centre of mass [mm]", "height of the lowest foot [mm]")
+    drawing, way, low = pair("way of the centre of mass [mm]", "height of the lowest foot [mm]")
     for axis, style in AXIS_LINES.items():
         moved = 1e3 * (motion[f"{axis}_m"] - motion[f"{axis}_m"][0])
         if axis == "z" or np.ptp(moved) > STILL:
             way.plot(motion["t_s"], moved, label="z (rise)" if axis == "z" else axis, **style)
     heights = [column for name, column in feet.items() if name.endswith("_height_m")]
     lowest = np.min(heights, axis=0) if heights else -motion["sinkage_m"]  # a folder of an older hedgebed
-    low.axhline(0.0, color=GREY, lw=0.8)
-    low.plot(motion["t_s"], 1e3 * lowest, color=INK, lw=1.2)
+    low.axhline(0.0, color=GREY, lw=0.8, label="undisturbed surface")
+    low.plot(motion["t_s"], 1e3 * lowest, color=INK, lw=1.2, label="lowest foot")
+    low.legend(loc="best")
     legend_above(drawing, way.lines, 3)
     return drawing
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from vis.film.film import ARROWS, draw_runs, shown
 from vis.film.reel import SpaceReel
@@ -37,6 +38,7 @@ from .answer import answer_tiles
 __all__ = ["draw_energy", "pair", "say_grains", "write_spatial_report"]
 
 Columns = Mapping[str, Array]
+_MOST_TICKS = 5  # Of the time: labels of a short run, as 0.0025, lie beside one another
 _TURN = "rotation from the start [degrees]"
 
 
@@ -115,8 +117,9 @@ def _states(report: Report, path: Columns, states: States) -> list[Block]:
 def pair(left: str, right: str) -> tuple[Figure, Axes, Axes]:
     """Two panels over time, with their labels."""
     drawing, ((one, other),) = sheet(1, 2, 3.2)
-    one.set(xlabel="time [s]", ylabel=left)
-    other.set(xlabel="time [s]", ylabel=right)
+    for axis, label in ((one, left), (other, right)):
+        axis.set(xlabel="time [s]", ylabel=label)
+        axis.xaxis.set_major_locator(MaxNLocator(_MOST_TICKS, steps=[1, 2, 5, 10]))
     return drawing, one, other
 
 

@@ -121,9 +121,10 @@ class CandidateFits:
             self.tell("looking for where the candidates' fits begin", 0.0)
             contacts.guess(model.with_forms(forms[:1]), self.base.fit.values)
         made: list[Hypothesis] = []
-        for effect, group in groupby(forms, key=lambda form: form.effect):
+        effects = len({form.effect for form in forms})
+        for place, (effect, group) in enumerate(groupby(forms, key=lambda form: form.effect), 1):
             own = list(group)
-            self.tell(f"trying {effect}", len(made) / max(1, len(forms)))
+            self.tell(f"trying {effect} ({place} of {effects})", len(made) / max(1, len(forms)))
             self._fit_alone(own)
             made += [self._kept(self._alone[form.id]) for form in own]
         if contacts is not None:

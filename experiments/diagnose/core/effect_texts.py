@@ -6,16 +6,19 @@ it holds.
 """
 
 import textwrap
+import tomllib
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 from experiments.diagnose.fit.problem import Form
 from rigid.terms import CANDIDATES, find_candidate
 from rigid.terms.candidate import Bend, Push
 
-__all__ = ["PENETRATION", "SYMBOLS", "TUMBLE", "advice", "confirmation", "equation", "equations_of", "meaning",
-           "push_advice", "with_comments"]  # fmt: skip
+__all__ = ["PENETRATION", "SYMBOLS", "TUMBLE", "advice", "confirmation", "equation", "equations_of", "form_meaning",
+           "meaning", "push_advice", "with_comments"]  # fmt: skip
 
+_FORMS: dict[str, dict[str, str]] = tomllib.loads(Path(__file__).with_name("forms.toml").read_text(encoding="utf-8"))
 _TABLE, _WIDE = "[[effect]]\n", 118
 _BY_DIAMETER = '"fitted_by_diameter" = '
 _OF_DIAMETERS = """\
@@ -66,6 +69,13 @@ def meaning(effect: str) -> str:
     """One sentence on what the effect is; empty where its file does not say it."""
     found = find_candidate(effect)
     return f"{effect}: {found.meaning}." if found is not None else ""
+
+
+def form_meaning(form: str) -> str:
+    """What a form such as ``plastic-sinkage:crater, empty`` is, in a clause; empty for effects of one's own."""
+    effect, _, name = form.partition(":")
+    known = _FORMS.get(effect, {})
+    return "; ".join(known[part] for part in name.split(", ") if part in known)
 
 
 def confirmation(effect: str, kind: str) -> str:

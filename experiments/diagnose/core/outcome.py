@@ -19,13 +19,14 @@ from experiments.diagnose.noise.colour import Colour
 from experiments.diagnose.noise.jitter import Jitter
 from experiments.diagnose.noise.replicates import groups_of
 from experiments.diagnose.noise.spectrum import Line, lines_of
-from vis.page.numbers import foldable, quote
+from vis.page.numbers import fitted, foldable, quote
 from vis.page.sentences import Sentences
 
 from .deciding import Gap, certain, closes, gap_of, is_misfit_of_form, smallest, unscattered, values_of_all
 from .effect_texts import confirmation
 from .matters import is_small, little_left, undecided
 from .next_steps import after_unknown
+from .planned_pushes import chosen_push, no_push_words, separates
 from .renoised import scatter_of, wander_of
 from .rivals import LEAD, Predicted, Rival, marked
 from .scatter_gap import ScatterGap, gap_with_scatter, weighed_residuals
@@ -213,12 +214,7 @@ class Diagnosis(Known):
         if near is None:
             return None
         plan = self.problem.planned(self.best, near.fit, inflation=_inflations(self.best, near.fit))
-        if plan is None or plan.apart is None or self.known_scatter is None:
-            return plan
-        bed = self.known_scatter.get("bed", 0.0)  # a bed that is stiffer makes both forces as much larger
-        wide = {f"{key}_std_N": math.hypot(plan.apart[f"{key}_std_N"], bed * plan.apart[f"{key}_N"])
-                for key in ("one", "other")}  # fmt: skip
-        return replace(plan, apart={**plan.apart, **wide})
+        return None if plan is None else chosen_push(plan, self.known_scatter or {})
 
     @cached_property
     def known_scatter(self) -> dict[str, float] | None:
@@ -288,11 +284,15 @@ class Diagnosis(Known):
             near = self.nearest_answer
             doubted = [name for name in self.effects if near is not None and name not in near.effects]
             general = confirmation((*doubted, *self.choice.best.effects)[0], self.problem.kind)
+            if none := self._no_push(self._nearest_model, general):
+                return none
             return f"{expected} {say('otherwise')} {general}" if (expected := self._expected) else general
         if self.verdict == "ambiguous":
             told = self.problem.next_experiment(self.forms[0], self.rivals[0], self.best.values)
             if (plan := self.planned) is None:
                 return told
+            if none := self._no_push(smallest(self.choice)[0], told):
+                return none
             times = math.ceil(LEAD / max(plan.nats, 1e-3))
             return f"{say('planned', plan=plan, times=f', so {times} of them do' if 1 < times < 100 else '')} {told}"
         weighed = self.gap_with_scatter
@@ -300,6 +300,13 @@ class Diagnosis(Known):
             self.problem, self.own_values, self.forms, self.left, self.dependence[1], beside=self.choice.best.effects,
             is_scatter=bool(self.effects) and weighed is not None and max(v or 0.0 for v in weighed.after) <= SMALL,
         )  # fmt: skip
+
+    def _no_push(self, near: Hypothesis | None, advice: str) -> str:
+        """That no push separates this answer from another one by more than beds differ; empty where one does."""
+        plan = self.planned
+        if near is None or plan is None or plan.apart is None or separates(plan.apart):
+            return ""
+        return no_push_words(plan, " + ".join(self.effects), " + ".join(self.ordered(near)), advice)
 
     @property
     def _expected(self) -> str:
@@ -390,8 +397,10 @@ def _inflations(one: Fit, other: Fit) -> tuple[float, float]:
 
 
 def _with_error(force: float, std: float) -> str:
-    """0.112 ± 0.008 N; a force that the model gives exactly has no error."""
-    return foldable(quote(force, std or None, "N"))
+    """0.112 ± 0.016 N, half of a 95 % interval; of a force that the model gives exactly, why it has no error."""
+    if not std:
+        return say("exact_force", force=foldable(quote(force, None, "N")))
+    return foldable(fitted({"value": force, "std": std, "unit": "N"}))
 
 
 def _between(one: Fit) -> Array:

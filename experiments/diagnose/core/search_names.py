@@ -1,4 +1,5 @@
-"""What a diagnosis says of the search that it is in. How many there will be is not known beforehand."""
+"""What a diagnosis says of the search that it is in. How many there will be is not known beforehand: a search is begun
+anew where replicates are found to differ, or readings are weighed anew."""
 
 from collections.abc import Callable, Iterable, Sequence
 
@@ -6,13 +7,17 @@ __all__ = ["differ_words", "named_search", "new_in_course"]
 
 _ORDINALS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth", "tenth")
 
+_MOST = 6
+"""Searches of four campaigns that were counted: 1, 2, 4 and 6 (docs/notes/diagnose.md, 2026-11-29)."""
+
 Tell = Callable[[str, float], None]
 
 
 def named_search(tell: Tell, number: int, new: str) -> Tell:
     """`tell`, with which search it is in front of what is told, and what is `new` in it. `number`: from 0 on."""
     ordinal = _ORDINALS[number] if number < len(_ORDINALS) else f"{number + 1}th"
-    name = f"{ordinal} search ({new})" if new else f"{ordinal} search"
+    name = f"{ordinal} search of 1 to {_MOST}" if number < _MOST else f"{ordinal} search"
+    name += f" ({new})" if new else ""
     return lambda what, done: tell(f"{name}: {what}", done)
 
 

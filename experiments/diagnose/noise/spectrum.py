@@ -19,7 +19,7 @@ from scipy import signal, stats
 from experiments.diagnose.fit.gaps import unit_of
 from experiments.diagnose.fit.localise import phases_of
 from experiments.diagnose.fit.problem import Array, Form, Problem, Values
-from vis.page.numbers import beside
+from vis.page.numbers import fitted, foldable
 
 __all__ = ["Line", "Part", "Piece", "line_rows", "line_sentence", "lines_of", "spectral_lines"]
 
@@ -267,5 +267,5 @@ def line_sentence(row: Mapping[str, Any]) -> str:
 
 
 def _with_error(value: float, std: float) -> str:
-    """Both to the digits that the error allows: 12.34 ± 0.04."""
-    return f"{beside(value, std)} ± {beside(std, std)}"
+    """With half of the 95 % interval, to the digits that it allows: 12.34 ± 0.08."""
+    return foldable(fitted({"value": value, "std": std, "unit": "1"}))

@@ -61,9 +61,10 @@ def best_push(
         settings = {"diameter_m": diameter, "speed_m_s": speed, "depth_m": part * depth, "hold_s": hold,
                     "returns": float(returns)}  # fmt: skip
         nats = float(0.5 * d @ np.linalg.solve(noise, d))
-        found.append(Planned(settings, "", nats, 0, _apart(z, v, forces, std)))
-    best = max(found, key=lambda push: push.nats)
-    return replace(best, what=_words(best.settings, len(diameters) > 1), tried=len(found))
+        words = _words(settings, len(diameters) > 1)
+        found.append(Planned(settings, words, nats, 0, _apart(z, v, forces, std)))
+    found = [replace(push, tried=len(found)) for push in found]
+    return replace(max(found, key=lambda push: push.nats), compared=tuple(found))
 
 
 def _apart(z: Array, v: Array, forces: Sequence[tuple[Array, Array]], std: float) -> dict[str, float]:
@@ -73,7 +74,7 @@ def _apart(z: Array, v: Array, forces: Sequence[tuple[Array, Array]], std: float
     apart = np.abs(one - other) / np.sqrt(one_std**2 + other_std**2 + std**2)
     at = int(np.argmax(np.where(z >= _KNOWN * z.max(), apart, -1.0)))
     return {"depth_m": float(z[at]), "speed_m_s": float(v[at]), "one_N": float(one[at]), "other_N": float(other[at]),
-            "one_std_N": float(one_std[at]), "other_std_N": float(other_std[at])}  # fmt: skip
+            "one_std_N": float(one_std[at]), "other_std_N": float(other_std[at]), "noise_N": std}  # fmt: skip
 
 
 def _words(push: Mapping[str, float], says_diameter: bool) -> str:

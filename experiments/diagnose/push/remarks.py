@@ -113,12 +113,12 @@ def _stiffness(pushes: Sequence[Push], *, is_open: bool) -> list[str]:
         by_size.setdefault(push.diameter, []).append(float(z @ force / max(float(z @ z), 1e-300)))
     parts = []
     for size, found in sorted(by_size.items()):
-        spread = f" ± {numeral(float(np.std(found, ddof=1)), 2)}" if len(found) > 1 else ""
         several = f"{len(found)} push{'es' if len(found) > 1 else ''}"
-        parts.append(f"{numeral(float(np.mean(found)), 4)}{spread} N/m for {1e3 * size:g} mm of diameter ({several})")
+        spread = f": {numeral(min(found), 3)} to {numeral(max(found), 3)}" if len(found) > 1 else ""
+        parts.append(f"{numeral(float(np.mean(found)), 4)} N/m for {1e3 * size:g} mm of diameter ({several}{spread})")
     sentences = [
-        f"K of a straight spring, fitted to each push alone{'' if is_open else ' with C of the model'} (±: standard "
-        f"deviation between pushes): {', '.join(parts)}. Pushes to other depths differ in it where the ground is no "
+        f"K of a straight spring, fitted to each push alone{'' if is_open else ' with C of the model'} (means, and in "
+        f"brackets all pushes): {', '.join(parts)}. Pushes to other depths differ in it where the ground is no "
         f"straight spring; where an effect is named, use the model's K."
     ]
     if len(by_size) > 2:

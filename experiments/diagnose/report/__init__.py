@@ -1,5 +1,5 @@
 """What a diagnosis says: diagnosis.json, its summary and sentences.
 
 Imports `experiments.campaign`, `experiments.diagnose.core`, `experiments.diagnose.fit`, `experiments.diagnose.noise`,
-`experiments.runs`, `vis.diagnose`, `vis.page`.
+`experiments.runs`, `rigid`, `vis.diagnose`, `vis.page`.
 """

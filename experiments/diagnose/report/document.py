@@ -21,7 +21,7 @@ import numpy as np
 
 from experiments.campaign.tables import ERRORS_NOTE, OTHERS_NOTE, PEAKS_NOTE, SCATTER_NOTE
 from experiments.diagnose.core.deciding import shares_left
-from experiments.diagnose.core.effect_texts import SYMBOLS, equations_of, with_comments
+from experiments.diagnose.core.effect_texts import SYMBOLS, equations_of, form_meaning, with_comments
 from experiments.diagnose.core.near import Near, near_models, nearest_each
 from experiments.diagnose.core.outcome import Diagnosis, Estimated
 from experiments.diagnose.core.rivals import LEAD, Rival
@@ -65,7 +65,7 @@ def document(found: Diagnosis, near: Sequence[Near] | None = None) -> dict[str, 
         stages = {"before": weighed.before, "after": weighed.after, "after_std": weighed.after_std}
         diagnosis["gap_with_scatter"] = {
             stage: {"fit": fitted, "held_out": held_out} for stage, (fitted, held_out) in stages.items()
-        } | {"freedom": weighed.freedom}
+        } | {"freedom": weighed.freedom, "trials": {"fit": len(found.fitted), "held_out": len(found.held_out)}}
     if rule := found.allowed_by:
         diagnosis["allowed_by"] = rule
         if rule == "form" and found.choice is not None:
@@ -112,6 +112,7 @@ def document(found: Diagnosis, near: Sequence[Near] | None = None) -> dict[str, 
     diagnosis["symbols"] = SYMBOLS if found.problem.kind == "penetration" and found.forms else ""
     diagnosis["equivalence"] = _equivalence(found)
     diagnosis["candidates"] = candidate_rows(diagnosis)
+    diagnosis["forms"] = _forms(diagnosis["candidates"])
     diagnosis["noise"] = _noise(found)
     diagnosis["model_std"] = dict(found.model_std)
     diagnosis["has_replicates"] = has_replicates(found.problem.trials)
@@ -145,6 +146,18 @@ def _base(found: Diagnosis, one: Fit) -> dict[str, Any]:
             if name in numbers and name in bounds:
                 numbers[name]["at_most"] = bounds[name]
     return numbers
+
+
+def _forms(candidates: Sequence[Mapping[str, Any]]) -> dict[str, str]:
+    """What each form of these candidates is, by its id; without forms of effects of one's own."""
+    ids: dict[str, str] = {}
+    for row in candidates:
+        effect = ""
+        for part in str(row["candidate"]).split(" + "):  # an effect with two forms is named once
+            effect, form = part.split(":", 1) if ":" in part else (effect, part)
+            if words := form_meaning(f"{effect}:{form}"):
+                ids[f"{effect}:{form}"] = words
+    return ids
 
 
 def _equivalence(found: Diagnosis) -> list[dict[str, Any]]:

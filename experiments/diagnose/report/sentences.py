@@ -1,5 +1,6 @@
 """Sentences and tables of a diagnosis: where the model fails, how large and how sure effects are, the candidates."""
 
+import math
 import re
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
@@ -19,7 +20,7 @@ from vis.page.sentences import Sentences
 __all__ = [
     "behind_words", "candidate_rows", "findings_in_words", "remark_sentences", "say",
     "setting_words", "shares_words",
-    "size_sentences", "small_names", "spread_sentences", "sure_sentences", "told_tables", "unnamed_sentence",
+    "size_sentences", "small_names", "sure_sentences", "told_tables", "unnamed_sentence",
     "where_sentences", "worse_sentences",
 ]  # fmt: skip
 
@@ -77,7 +78,7 @@ def sure_sentences(diagnosis: Row) -> list[str]:
         if sure:
             sure += f"; the nearest other name, {near['effect']}, is {behind_words(near)} ({LEAD:.0f} are needed), "
         sure += f"and its change of the data is {near['angle_deg']:.0f} degrees away (0: the same): {apart}"
-    return [*sentences, *size_sentences(diagnosis), *remark_sentences(diagnosis), *([f"{sure}."] if sure else []),
+    return [*sentences, *size_sentences(diagnosis), *([f"{sure}."] if sure else []),
             *_how_often(diagnosis), *unnamed_sentence(diagnosis)]  # fmt: skip
 
 
@@ -103,27 +104,6 @@ def _must_gain(own: Row) -> str:
 def _least(counted: Row) -> float:
     """The lower bound of a rate [%] of which `right` of `named` were counted."""
     return 100 * float(beta.ppf(1 - _BOUND, counted["right"], counted["named"] - counted["right"] + 1))
-
-
-_SPREAD_UNITS = {
-    "force": "N, each in its own way", "depth": "m, each in its own way", "accel": "m/s2, each in its own way",
-    "depth zero": "m", "force zero": "N",
-}  # fmt: skip
-"""Of channels and zeros in `model_std`, which holds relative numbers otherwise."""
-
-
-def spread_sentences(model_std: Mapping[str, float], *, granular: bool) -> list[str]:
-    """By what replicates differ beyond the sensors, in a sentence; of several kinds the sizes are guesses.
-    `model_std`: kind -> standard deviation; `granular`: whether the ground is a bed of grains."""
-    if len(model_std) > 1:
-        sizes = {k: (s, _SPREAD_UNITS[k]) if k in _SPREAD_UNITS else (100 * s, "%") for k, s in model_std.items()}
-        return [say("spreads", kinds=" and ".join(f"{k} by {s:.2g} {unit}" for k, (s, unit) in sizes.items()))]
-    whose = "the bed" if granular else "the surface, the rig or the start"
-    return [
-        say("spread", kind=kind, std=std, unit=_SPREAD_UNITS.get(kind, "(relative)"),
-            of=say("spread_zero") if kind.endswith(" zero") else whose)
-        for kind, std in model_std.items()
-    ]  # fmt: skip
 
 
 def behind_words(rival: Row) -> str:
@@ -154,10 +134,13 @@ def size_sentences(diagnosis: Row) -> list[str]:
     if not sizes:
         return []
     most = max(size["signature"] for size in sizes)
-    words = "; ".join(_size_words(size, is_small=_is_small(size, most) and not _carries(size)) for size in sizes)
+    words = [_size_words(size, is_small=_is_small(size, most) and not _carries(size)) for size in sizes]
     own = [f"{size['effect']} {part}" for size in sizes if (part := _own_words(size.get("own_force")))]
-    carries = f"in the fitted law {' and '.join(own)}. If" if own else "if"
-    return [f"How large: {carries} {say('refitted')} {words}."]
+    carries = f" In the fitted law {' and '.join(own)}." if own else ""
+    if len(sizes) == 1:
+        return [f"How large:{carries} {say('refitted_one', effect=sizes[0]['effect'])} {words[0]}."]
+    each = "; ".join(f"without {size['effect']} {part}" for size, part in zip(sizes, words, strict=True))
+    return [f"How large:{carries} {say('refitted')} {each}."]
 
 
 def remark_sentences(diagnosis: Row) -> list[str]:
@@ -180,7 +163,7 @@ def worse_sentences(diagnosis: Row) -> list[str]:
         held = " of trials held out" if row["held_out"] else ""
         few = f" ({row['samples']} samples)" if row.get("samples", _FEW) < _FEW else ""
         parts.append(f"{row['channel']} in phase {row['phase']}{held}{few} {_from_to(row)}")
-    return [f"It makes worse, in chi-square per sample: {'; '.join(parts)}."] if parts else []
+    return [f"It makes worse, by the gap: {'; '.join(parts)}."] if parts else []
 
 
 def _common(conditions: Sequence[Row]) -> dict[str, float]:
@@ -191,9 +174,14 @@ def _common(conditions: Sequence[Row]) -> dict[str, float]:
 
 
 def _worst(rows: Sequence[Row], factor: float) -> list[Row]:
-    """Those that grow by `factor` and are past noise then, at most three, by what is added over all samples."""
-    grown = [row for row in rows if row["after"] > max(factor * row["before"], _STANDING)]
+    """Those that grow by `factor` and are past noise and its chance then, three deviations of a mean square; at
+    most three, by what is added over all samples."""
+    grown = [row for row in rows if row["after"] > max(factor * row["before"], _STANDING, _by_chance(row))]
     return sorted(grown, key=lambda row: row["samples"] * (row["before"] - row["after"]))[:_WORSE_SHOWN]
+
+
+def _by_chance(row: Row) -> float:
+    return 1 + 3 * math.sqrt(2 / max(row.get("samples", _FEW), 1))
 
 
 def _from_to(row: Row) -> str:
@@ -242,10 +230,10 @@ def _own_words(own: Row | None) -> str:
 
 
 def _size_words(size: Row, *, is_small: bool) -> str:
-    """shaft-friction changes the force by 0.4 N (root mean square, 1.2 N at most), 21 % of it, 9 times the noise"""
-    times = f"{numeral(size['signature'], 2)} times the noise of all readings"
+    """by 0.4 N in force (root mean square; 1.2 N at most), 21 % of it, 9 times the noise"""
+    times = f"{numeral(size['signature'], 2)} times the noise"
     if size["channel"] is None:
-        return f"{size['effect']} changes nothing that can be seen"
+        return "by nothing that can be seen"
     share = f", {100 * size['share']:.2g} % of it" if size["share"] is not None else ""
     return say("is_small" if is_small else "changes", size=size, share=share, times=times)
 
@@ -318,7 +306,7 @@ def told_tables(diagnosis: Row) -> list[dict[str, Any]]:
     if diagnosis["by_phase"] and diagnosis["verdict"] != "none":
         tables += _in_units(diagnosis)
         tables.append({
-            "title": "chi-square per sample by phase and channel", "head": ["phase", "channel", *_STAGES],
+            "title": "gap by phase and channel", "head": ["phase", "channel", *_STAGES],
             "rows": _by_stage(diagnosis["by_phase"], ("phase", "channel"), ("before", "after"), numeral),
         })  # fmt: skip
     if aside := diagnosis.get("set_aside", []):
@@ -335,7 +323,7 @@ def told_tables(diagnosis: Row) -> list[dict[str, Any]]:
         title = "candidates, the best form of each" + (f" ({worse})" if worse else "")
         tables.append({
             "title": title if better else say("none_better"),
-            "head": ["candidate", "evidence over the base model [nats]", "chi-square a sample beyond noise"],
+            "head": ["candidate", "evidence over the base model [nats]", say("excess")],
             "rows": [[row["candidate"], f"{row['score']:.1f}", f"{row['left']:.3g}"] for row in better or rows],
         })  # fmt: skip
     return tables
@@ -371,7 +359,7 @@ def _in_units(diagnosis: Row) -> list[dict[str, Any]]:
         common = _common(conditions)
         shared = ", ".join(setting_words(*pair) for pair in common.items())
         tables.append({
-            "title": "chi-square per sample by condition" + (f" ({shared} in all)" if shared else ""),
+            "title": "gap by condition" + (f" ({shared} in all)" if shared else ""),
             "head": ["condition", "trials", "before", "after"],
             "rows": [[", ".join(setting_words(*pair) for pair in row["settings"].items() if pair[0] not in common)
                       or "the same", ", ".join(row["trials"]),

@@ -9,7 +9,8 @@ from experiments.diagnose.fit.evidence import SMALL
 from experiments.diagnose.fit.gaps import numeral, size_words
 from experiments.diagnose.noise.spectrum import line_sentence
 from vis.diagnose.held_out import worsens_held_out
-from vis.page.numbers import foldable, quote
+from vis.diagnose.usable import gap_in_scatter
+from vis.page.numbers import fitted, foldable
 
 from .sentences import (
     behind_words,
@@ -22,7 +23,14 @@ from .sentences import (
     unnamed_sentence,
     worse_sentences,
 )
-from .to_use import law_sentences, near_model_sentences, number_words, peak_sentences, use_sentences
+from .to_use import (
+    law_sentences,
+    near_model_sentences,
+    neutral_sentences,
+    number_words,
+    peak_sentences,
+    use_sentences,
+)
 
 __all__ = ["scatter_sentence", "summary_sentences", "title_words"]
 
@@ -98,17 +106,18 @@ def summary_sentences(diagnosis: Mapping[str, Any]) -> list[str]:
         gap = {key: "-" if value is None else numeral(value) for key, value in diagnosis["gap"]["after"].items()}
         first = [say("noisy", gap=gap, stds=stds)]
     elif diagnosis["verdict"] == "unknown":
-        first = [*_candidates(diagnosis), *_left(diagnosis), *worse_sentences(diagnosis)]
+        first = [*_candidates(diagnosis), *_left(diagnosis)]
     else:
-        first = [*sure_sentences(diagnosis), *worse_sentences(diagnosis)]
+        first = sure_sentences(diagnosis)
     if diagnosis["verdict"] != "unknown":
         first += [*_residue(diagnosis), *_allowed(diagnosis)]
     aside = list(dict.fromkeys(row["trial"] for row in diagnosis.get("set_aside", [])))
     apart = [say("took_no_part", trials=", ".join(aside))] if aside else []
     use = [*use_sentences(diagnosis), *law_sentences(diagnosis)]
-    return [*_doubts(diagnosis), *_stated_far(diagnosis), *peak_sentences(diagnosis), *use, *apart, *first,
-            *scatter_sentence(diagnosis), *_no_replicates(diagnosis),
-            *near_model_sentences(diagnosis), f"Next experiment: {ask}"]  # fmt: skip
+    doubts = [*_doubts(diagnosis), *_stated_far(diagnosis), *remark_sentences(diagnosis), *peak_sentences(diagnosis),
+              *worse_sentences(diagnosis), *neutral_sentences(diagnosis), *_no_replicates(diagnosis)]  # fmt: skip
+    return [*doubts, *use, *apart, *first, *scatter_sentence(diagnosis), *near_model_sentences(diagnosis),
+            f"Next experiment: {ask}"]  # fmt: skip
 
 
 def _stated_far(diagnosis: Mapping[str, Any]) -> list[str]:
@@ -123,9 +132,9 @@ def _stated_far(diagnosis: Mapping[str, Any]) -> list[str]:
 
 
 def _far_words(bound: Mapping[str, Any]) -> str:
-    """stiffness = 2275 N/m is +15.3 sigma from the stated 900 ± 90"""
+    """stiffness = 2275 N/m is +15.3 sigma from the stated 900 (sigma 90)"""
     unit = "" if bound["unit"] == "1" else f" {bound['unit']}"
-    stated = f"{bound['stated']:.4g} ± {bound['stated_std']:.2g}" if bound.get("stated_std") else "value"
+    stated = f"{bound['stated']:.4g} (sigma {bound['stated_std']:.2g})" if bound.get("stated_std") else "value"
     return f"{bound['parameter']} = {bound['value']:.4g}{unit} is {bound['sigmas']:+.1f} sigma from the stated {stated}"
 
 
@@ -199,8 +208,8 @@ def scatter_sentence(diagnosis: Mapping[str, Any]) -> list[str]:
     s = "" if freedom == 1 else "s"
     return [say(
         "weighed_none" if diagnosis["verdict"] == "none" else "weighed_both",
-        scatter=f" ({' and '.join(kinds)}{apart})" if kinds else "", before=_both(weighed["before"], {}),
-        after=_both(weighed["after"], weighed.get("after_std", {})),
+        scatter=f" ({' and '.join(kinds)}{apart})" if kinds else "", before=_both(diagnosis, "before"),
+        after=_both(diagnosis, "after"),
         rests_on=f"; the scatter has {freedom} degree{s} of freedom" if freedom else "",
     )]  # fmt: skip
 
@@ -210,14 +219,14 @@ def _no_replicates(diagnosis: Mapping[str, Any]) -> list[str]:
     return [] if diagnosis.get("has_replicates", True) else [say(f"no_replicates_{diagnosis['kind']}")]
 
 
-def _both(gap: Mapping[str, float | None], errors: Mapping[str, float | None]) -> str:
-    """A gap, fitted and held out, with its standard errors."""
+def _both(diagnosis: Mapping[str, Any], stage: str) -> str:
+    """The gap with the scatter of replicates, fitted and held out, with halves of 95 % intervals."""
 
-    def written(key: str) -> str:
-        error = errors.get(key)
-        return numeral(gap[key] or 0.0) if error is None else foldable(quote(gap[key], error))
+    def written(part: str) -> str:
+        gap = gap_in_scatter(diagnosis, part, stage)
+        return numeral(gap["value"] or 0.0) if gap["std"] is None else foldable(fitted(gap))
 
-    out = "" if gap["held_out"] is None else f" ({written('held_out')} held out)"
+    out = "" if diagnosis["gap_with_scatter"][stage]["held_out"] is None else f" ({written('held_out')} held out)"
     return f"{written('fit')} fitted{out}"
 
 
@@ -241,7 +250,7 @@ def _candidates(diagnosis: Mapping[str, Any]) -> list[str]:
             return ["No effect of the library could be tried."]
         listed = _closing(sorted(rows, key=lambda row: -(row.get("closes") or 0.0))[:_SHOWN])
         costs = "" if any(row["score"] > 0 for row in rows) else f" {say('costs_more')}"
-        return [f"No effect of the library explains the misfit. Of the misfit beyond the noise, {listed}.{costs}"]
+        return [f"No effect of the library explains the misfit. Of the excess, {listed}.{costs}"]
     if worsens_held_out(diagnosis):
         gaps = {stage: numeral(diagnosis["gap"][stage]["held_out"]) for stage in ("before", "after")}
         return [say("worse_held_out", names=" + ".join(leading["effects"]), **gaps)]
@@ -259,11 +268,11 @@ def _candidates(diagnosis: Mapping[str, Any]) -> list[str]:
         apart = "these trials distinguish the two" if near["told_apart"] else "these trials do not distinguish the two"
         first += say("nearest", near=near, behind=behind_words(near), apart=apart)
     sentences.append(f"{first}.")
-    sentences += [*_numbers(leading), *size_sentences(diagnosis), *remark_sentences(diagnosis)]
+    sentences += [*_numbers(leading), *size_sentences(diagnosis)]
     sentences += unnamed_sentence(diagnosis)
     rest = [row for row in _singles(diagnosis) if row["effects"][0] not in leading["effects"]][: _SHOWN - 1]
     if rest and not certain:
-        sentences.append(f"Of the misfit of the base model beyond the noise{_weighed(diagnosis)}, {_closing(rest)}.")
+        sentences.append(f"Of the base model's excess{_weighed(diagnosis)}, {_closing(rest)}.")
     return [*sentences, *_why_unknown(diagnosis)]
 
 
@@ -328,9 +337,7 @@ def _closes(gap: Mapping[str, Any]) -> str:
         before, after = gap["before"][key], gap["after"][key]
         if before is None or after is None:
             continue
-        share = (
-            f", {_share(1 - max(after - 1, 0.0) / (before - 1))} of the misfit beyond the noise" if before > 1 else ""
-        )
+        share = f" ({_share(1 - max(after - 1, 0.0) / (before - 1))} of the misfit)" if before > 1 else ""
         parts.append(f"from {numeral(before)} to {numeral(after)} {words}{share}")
     return " and ".join(parts)
 

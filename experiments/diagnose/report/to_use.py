@@ -1,4 +1,4 @@
-"""Which K and C of pushes and drops to use, in which law, and what their standard errors leave out."""
+"""Which K and C of pushes and drops to use, in which law, and what their errors leave out."""
 
 import math
 from collections.abc import Mapping
@@ -6,17 +6,17 @@ from typing import Any
 
 from experiments.campaign.model_errors import bias_words
 from experiments.diagnose.fit.gaps import numeral
+from rigid.intervals import half_of
 from vis.diagnose.usable import has_numbers_to_use, secant_depth, stiffness_words
-from vis.page.numbers import foldable, quote
+from vis.page.numbers import fitted, foldable
 
 from .sentences import say
 
-__all__ = ["SERIES", "law_sentences", "near_model_sentences", "number_words", "peak_sentences", "unloading_sentences",
-           "use_sentences"]  # fmt: skip
+__all__ = ["SERIES", "law_sentences", "near_model_sentences", "neutral_sentences", "number_words", "peak_sentences",
+           "unloading_sentences", "use_sentences"]  # fmt: skip
 
 SERIES = {"count": 77, "middle": 0.3, "most": 3.3}
 """By how much K of campaigns without an effect was below the ground's [%]: docs/results/diagnose-second, pushes."""
-_NEUTRAL = 2.0  # standard errors within which a number is not distinguished from 0
 _STRONG, _PAIRS = 0.9, 3  # correlation from which on it is reported, and of how many pairs
 _SHOWN = 4  # diameters whose K is in the sentence; of more it is in the table
 
@@ -71,14 +71,13 @@ def _words(name: str, entry: Mapping[str, Any]) -> str:
 
 
 def number_words(entry: Mapping[str, Any]) -> str:
-    """A fitted number with its standard error, both to the same digit, and its unit: 820 ± 120 N/m."""
-    known = entry["std"] is not None and entry.get("determined", True)
-    return foldable(quote(entry["value"], entry["std"] if known else None, entry["unit"], significant=4))
+    """A fitted number with half of its 95 % interval, both to the same digit, and its unit: 820 ± 120 N/m."""
+    known = dict(entry) if entry.get("determined", True) else {**entry, "std": None}
+    return foldable(fitted(known, significant=4))
 
 
 def law_sentences(diagnosis: Mapping[str, Any]) -> list[str]:
-    """The law of pushes with its numbers, which of these are not distinguished from 0, and which depend on one another;
-    none where nothing is named."""
+    """The law of pushes with its numbers, and which depend on one another; none where nothing is named."""
     rows = [row for row in diagnosis.get("equations", []) if row["equation"]]
     if diagnosis.get("kind") != "penetration" or not (has_numbers_to_use(diagnosis) and rows):
         return []
@@ -89,16 +88,23 @@ def law_sentences(diagnosis: Mapping[str, Any]) -> list[str]:
         listed = ", ".join(f"{name} = {number_words(entry)}" for name, entry in own.items())
         parts.append(f"{row['effect']}: {row['equation']}" + (f", with {listed}" if listed else ""))
     reference = "" if depth is None else say("reference", depth_mm=1e3 * depth)
+    said = [say("law", parts="; ".join(parts), reference=reference)]
+    said += unloading_sentences(diagnosis)
+    pairs = _correlated(diagnosis.get("errors", {}))
+    return said + ([say("correlated", listed=", ".join(pairs))] if pairs else [])
+
+
+def neutral_sentences(diagnosis: Mapping[str, Any]) -> list[str]:
+    """Which numbers of the effects are not distinguished from 0; none where no law of pushes is named."""
+    if diagnosis.get("kind") != "penetration" or not has_numbers_to_use(diagnosis):
+        return []
+    numbers = {effect["id"]: effect["parameters"] for effect in diagnosis["effects"]}
     weak = [
         f"{name} = {number_words(entry)}"
         for own in numbers.values() for name, entry in own.items()
-        if entry["std"] and entry.get("determined", True) and abs(entry["value"]) < _NEUTRAL * entry["std"]
+        if entry["std"] and entry.get("determined", True) and abs(entry["value"]) < (half_of(entry) or 0.0)
     ]  # fmt: skip
-    said = [say("law", parts="; ".join(parts), reference=reference)]
-    said += unloading_sentences(diagnosis)
-    said += [say("neutral", listed=", ".join(weak))] if weak else []
-    pairs = _correlated(diagnosis.get("errors", {}))
-    return said + ([say("correlated", listed=", ".join(pairs))] if pairs else [])
+    return [say("neutral", listed=", ".join(weak))] if weak else []
 
 
 def peak_sentences(diagnosis: Mapping[str, Any]) -> list[str]:

@@ -1,7 +1,7 @@
 """The error of a peak force that a model.toml predicts: of its fit, and the scatter of the beds it was fitted to."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -16,7 +16,7 @@ from experiments.diagnose.push.slots import SLOTS, slot_places
 from experiments.runs.types import Json
 from vis.page.sentences import Sentences
 
-__all__ = ["Law", "PeakError", "peak_error", "peak_of", "with_fit_errors"]
+__all__ = ["Law", "PeakError", "peak_error", "peak_of", "returned_std", "with_fit_errors"]
 
 Array = NDArray[np.float64]
 say = Sentences(__package__)
@@ -90,17 +90,51 @@ def peak_of(law: Law, like: Penetration) -> float:
     return float(_peaks(law, _lanes(law, like, 1), like)[0])
 
 
+def returned_std(law: Law, likes: Sequence[Penetration]) -> float | None:
+    """Standard error of the share of the work of loading that unloading returns, by the errors of the fit.
+
+    The share is a mean over `likes`, driven runs. None as `PeakError.fit`. A stiffer bed raises both works alike."""
+    if not likes:
+        return None
+    tables = [_moved(law, like) for like in likes]
+    shares = [
+        _returned(_forces(law, table, like), like)
+        for table, like in zip(tables, likes, strict=True)
+        if table is not None
+    ]
+    errors = law.own_errors
+    if errors is None or not shares:
+        return None
+    mean = np.mean(shares, axis=0)
+    return errors.propagated(mean[0::2], mean[1::2])
+
+
+def _returned(forces: Array, like: Penetration) -> Array:
+    """Work of unloading over work of loading of each lane, `forces` of shape [lane_count, n], along a path."""
+    ways = np.diff(like.depth)
+    works = 0.5 * (forces[:, 1:] + forces[:, :-1]) * ways
+    loading = works[:, ways > 0].sum(axis=1)
+    return -works[:, ways < 0].sum(axis=1) / np.maximum(loading, 1e-300)
+
+
+def _forces(law: Law, table: Array, like: Penetration) -> Array:
+    """Force [N] of each lane of the law along the path, shape [lane_count, n]."""
+    lanes, path = np.zeros(len(table), np.int32), np.array([0, len(like.time)], dtype=np.int32)
+    return push(table, lanes, path, like.depth, like.velocity, law.own, like.time)
+
+
 def _peaks(law: Law, table: Array, like: Penetration) -> Array:
     """Peak force [N] of each lane of the law, shape [lane_count]."""
-    lanes, path = np.zeros(len(table), np.int32), np.array([0, len(like.time)], dtype=np.int32)
-    return push(table, lanes, path, like.depth, like.velocity, law.own, like.time).max(axis=1)
+    return _forces(law, table, like).max(axis=1)
 
 
 def _lanes(law: Law, like: Penetration, count: int) -> Array:
     return np.repeat(law.numbers(speed=float(np.abs(like.velocity).max())), count, axis=0)
 
 
-def _fit_std(law: Law, like: Penetration) -> float | None:
+def _moved(law: Law, like: Penetration) -> Array | None:
+    """Lanes of the law with each fitted number moved up and down by `SHARE` of its standard error, one after the other;
+    None where the numbers have no errors, or one is not determined."""
     errors, places = law.own_errors, slot_places(law.own)
     if errors is None or errors.undetermined:
         return None
@@ -110,6 +144,13 @@ def _fit_std(law: Law, like: Penetration) -> float | None:
         if slot in places:  # K and C of other diameters are in none
             step = SHARE * std * law.factors.get(slot, 1.0)
             table[2 * k : 2 * k + 2, places[slot]] += step, -step
+    return table
+
+
+def _fit_std(law: Law, like: Penetration) -> float | None:
+    table, errors = _moved(law, like), law.own_errors
+    if table is None or errors is None:
+        return None
     peaks = _peaks(law, table, like)
     return errors.propagated(peaks[0::2], peaks[1::2])
 
@@ -131,10 +172,11 @@ def _scatter_std(law: Law, like: Penetration) -> float | None:
 
 
 def with_fit_errors(
-    numbers: Mapping[str, Json], errors: ModelErrors | None, peaks: Mapping[str, PeakError]
-) -> dict[str, Json]:
-    """Quantities of a model with their errors: K and C with those of the fit, peak forces as `peaks` has them. Where
-    the fit leaves a number open, the note of a peak force names it."""
+    numbers: Mapping[str, Json], errors: ModelErrors | None, peaks: Mapping[str, PeakError],
+    returned: float | None = None,
+) -> dict[str, Json]:  # fmt: skip
+    """Quantities of a model with their errors: K and C with those of the fit, peak forces as `peaks` has them, and
+    `returned`: that of the work that unloading returns. Where the fit leaves a number open, a note names it."""
     found = dict(numbers)
     if errors is None:
         return found
@@ -150,4 +192,11 @@ def with_fit_errors(
         found[name] = {**found[name], "std": error.whole, "note": f"{found[name]['note']}; {words}"}
         if error.freedom is not None:
             found[name]["freedom"] = error.freedom
+    if (entry := found.get("work_returned_amended")) is not None and entry["value"] is not None:
+        words = (
+            say("fit_error")
+            if returned is not None
+            else say("no_fit_error" if open_ones else "no_way_out", names=open_ones)
+        )
+        found["work_returned_amended"] = {**entry, "std": returned, "note": f"{entry['note']}; {words}"}
     return found

@@ -5,19 +5,29 @@ from __future__ import annotations
 import math
 import re
 import tomllib
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from experiments.diagnose.core.effect_texts import PENETRATION, TUMBLE, equation, equations_of, with_comments
+from experiments.diagnose.core import effect_texts as texts
+from experiments.diagnose.core.effect_texts import (
+    PENETRATION,
+    TUMBLE,
+    equation,
+    equations_of,
+    form_meaning,
+    with_comments,
+)
 from experiments.diagnose.fit.forms import shapes_of
 from experiments.diagnose.push.forms import Scales, physical, push_forms
 from experiments.diagnose.push.law import push
 from experiments.diagnose.push.slots import SLOTS, slot_table
 from experiments.diagnose.tumble import forms as tumble
-from rigid.terms import EFFECTS
+from rigid.terms import CANDIDATES, EFFECTS
+from rigid.terms.candidate import Typical
 
 K, C, DEEPEST, SPEED, D, H = 900.0, 4.0, 0.02, 0.05, 0.015, 0.006
 SCALES = Scales(depth=D, speed=SPEED, force=K * D)
@@ -142,3 +152,23 @@ def test_model_toml_has_the_equation_above_each_effect_and_reads_as_before():
     assert "# mine (own):" in commented and "# F is" in commented
     assert tomllib.loads(commented) == tomllib.loads(text)
     assert with_comments("x = 1\n", [], "penetration") == "x = 1\n"
+
+
+def test_every_form_has_a_clause_and_those_of_pushes_are_in_the_glossary():
+    """Reports print its name; bends have theirs behind a comma, and nothing in the table is of no form."""
+    named: dict[str, set[str]] = {}
+    typical = Typical(sinkage=1e-3, weight=1.0)
+    for effect, found in CANDIDATES.items():
+        forms = [*(found.push.forms if found.push else ()), *(found.tumble.forms(typical) if found.tumble else ())]
+        bends = [*(found.push.bends if found.push else ()), *(found.tumble.bends if found.tumble else ())]
+        parts = {part for one in (*forms, *bends) for part in one.name.removeprefix("{}, ").split(", ")}
+        named[effect] = parts
+        assert all(form_meaning(f"{effect}:{part}") for part in parts), effect
+    table = tomllib.loads(Path(texts.__file__).with_name("forms.toml").read_text(encoding="utf-8"))
+    assert {effect: set(forms) for effect, forms in table.items()} == named
+    glossary = (Path(__file__).parents[3] / "docs/glossary.md").read_text(encoding="utf-8")
+    lines = {line[2:].split(":")[0].split(",")[0].split(" ")[0]: line for line in glossary.splitlines()}
+    for id in FORMS:
+        effect, _, name = id.partition(":")
+        assert all(f"**{part}**" in lines[effect] for part in name.split(", ")), id
+    assert form_meaning("plastic-sinkage:crater, empty").count(";") == 2 and form_meaning("mine:own") == ""

@@ -183,6 +183,27 @@ def test_without_a_bed_the_command_shows_both_laws(tmp_path, capsys):
     assert "plastic-sinkage" in (tmp_path / "run" / "report.html").read_text()
 
 
+def test_the_work_that_is_returned_has_the_error_of_the_fit_or_why_it_has_none(tmp_path):
+    """(1 - f) K z / (K z + 2 C v) of a crater: its derivative by f is the share itself over 1 - f."""
+    note = (f'[notes.{ERRORS_NOTE}]\nnames = ["stiffness", "damping", "plastic-sinkage.crater_share"]\n'
+            "std = [0, 0, 0.03]\ncorrelation = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]\n")  # fmt: skip
+    crater, found = CRATER.replace("0.9", "0.4"), {}
+    unseen = f"[notes.{RANGE_NOTE}]\ndepth_m = 0.02\nwithdrawal = false\n"
+    for name, more in (("known", "undetermined = []\n"), ("open", 'undetermined = ["damping"]\n'),
+                       ("unseen", "undetermined = []\n" + unseen)):  # fmt: skip
+        (tmp_path / f"{name}.toml").write_text(MODEL + note + more + crater)
+        settings = PenetrateSettings(
+            ground="spring-damper", model=str(tmp_path / f"{name}.toml"), load=0.1, depth=0.01, speeds=(0.1,),
+            other_speeds=(), drop_speeds=(), other_drop_speeds=(), frame_count=0,
+        )  # fmt: skip
+        found[name] = penetrate.run(settings, tmp_path / name)["quantities"]["work_returned_amended"]
+    share = K * 0.01 / (K * 0.01 + 2 * C * 0.1)
+    assert found["known"]["value"] == pytest.approx(0.6 * share, rel=0.03)
+    assert found["known"]["std"] == pytest.approx(0.03 * share, rel=0.03)
+    assert found["open"]["std"] is None and "determine damping" in found["open"]["note"]
+    assert found["unseen"]["std"] is None and "was withdrawn" in found["unseen"]["note"]
+
+
 def test_the_peak_force_of_a_model_has_the_error_that_its_numbers_and_their_correlation_make(tmp_path):
     """F = K z + C v on the way in: var F = (z sK)^2 + (v sC)^2 + 2 r z v sK sC; a crater changes no loading."""
     (s_k, s_c, s_f), r = (2.0, 0.05, 0.03), -0.6

@@ -89,6 +89,56 @@ def test_a_bed_that_never_rests_says_how_much_it_moves():
 def test_a_floor_that_never_carries_the_bed_in_the_lowered_gravity_is_a_setting_that_does_not_fit():
     """Exit status 2, as where the grains never rest."""
     bed = Ringing(drag_helps=True)
-    bed.floor_force, bed.set_gravity = 0.5, lambda gravity: None
+    bed.floor_force, bed.set_gravity, bed.gravity = 0.5, lambda gravity: None, (0.0, 0.0, -9.81)
     with pytest.raises(UnfitSettingsError, match="the floor"):
         lower_gravity(bed, 0.1, unit=1e-3)
+
+
+class Shown:
+    """Keeps the shares of a stage."""
+
+    def __init__(self):
+        self.shares = []
+
+    def show_bed(self, bed):
+        pass
+
+    def update(self, share):
+        self.shares.append(share)
+
+
+@pytest.mark.parametrize(("gravity", "spells"), [(0.1, 30), (0.01, 100)])
+def test_gravity_falls_in_steps_that_the_grains_follow_and_the_share_goes_on_to_the_end(gravity, spells):
+    """The share of the estimate's time: while gravity falls by ln(g / g') units, and in a rest of twice the longer
+    unit, sqrt(g / g'); a rest that is late goes on ever more slowly. Rest may last ten of these."""
+    bed, shown, seen = Ringing(drag_helps=True), Shown(), []
+    falls, rests = np.log(10 / gravity), 2 * (10 / gravity) ** 0.5
+    bed.drag_helps = False  # a thousandth in each step and spell, down to the energy of rest
+    bed.kinetic_energy = 1e-5 * 0.999 ** -(np.ceil(10 * falls) + spells - 0.5)
+    bed.gravity, bed.floor_force = (0.0, 0.0, -10.0), 1.0
+    bed.set_gravity = seen.append
+    lower_gravity(bed, gravity, unit=1e-3, progress=shown)
+    ratios = np.divide([10.0, *seen[:-1]], seen)
+    assert seen[-1] == pytest.approx(gravity) and ratios.max() < 1.11 and len(seen) == np.ceil(10 * falls)
+    shares = np.array(shown.shares)
+    assert (np.diff(shares) > 0).all() and shares[-1] < 1
+    assert shares[len(seen) - 1] == pytest.approx(falls / (falls + rests))
+    on_time = int(0.8 * rests / 1.5)
+    assert shares[len(seen) + on_time - 1] == pytest.approx((falls + 1.5 * on_time) / (falls + rests))
+
+
+def test_a_rest_in_a_drag_and_without_it_shows_a_share_that_never_stands_still():
+    """The drag is half of it, by the logarithm of the energy: from 300 times that of rest to less in three spells."""
+    bed, shown = Ringing(drag_helps=True), Shown()
+    bed.free, bed.kinetic_energy = 0, 3e-2
+
+    def advance(steps, *, drag_time=np.inf):
+        Ringing.advance(bed, steps, drag_time=drag_time)
+        if not bed.drags[-1]:
+            bed.free += 1
+            bed.kinetic_energy = 2e-5 if bed.free < 12 else 1e-6
+
+    bed.advance = advance
+    come_to_rest(bed, unit=1e-3, progress=shown)
+    assert shown.shares[:4] == pytest.approx([0.0, *(0.5 - 0.5 * np.log([30, 3, 1]) / np.log(300))])
+    assert len(shown.shares) == 15 and (np.diff(shown.shares) > 0).all() and 0.9 < shown.shares[-1] < 1

@@ -39,6 +39,13 @@ def test_one_refusal_names_all_sides_of_a_bed_and_a_bed_of_that_size_gives_no_fu
     assert [said for said in on_bed(bed_size=(0.2, *size[1:])).told.warnings if "narrower than" in said]
 
 
+@pytest.mark.parametrize(("given", "told"), [({}, True), ({"stiffness": 2000.0, "damping": 5.0}, False)])
+def test_a_refusal_of_the_width_names_the_law_that_decides_it_and_why_not_the_default_one(given, told):
+    with pytest.raises(ValueError, match="too short") as refused:
+        on_bed(**given, bed_size=(0.05, 0.24, 0.2)).check_extent()
+    assert told == ("not by rft" in str(refused.value))
+
+
 def test_a_ball_of_five_grains_is_accepted_though_its_outline_is_a_polygon_and_so_is_the_grain_that_a_refusal_names(
     tmp_path,
 ):

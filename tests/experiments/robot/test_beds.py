@@ -10,7 +10,7 @@ from spatial_runs import EXAMPLES, grain_bed
 
 from experiments.compare.robots import read_moved
 from experiments.grains.bed_progress import show_bed
-from experiments.grains.bed_result import sides_warning
+from experiments.grains.bed_result import sides_warning, sleep_words
 from experiments.grains.on_bed import PlatformOnBed
 from experiments.platform.law_spread import moved
 from experiments.robot import experiment as robot
@@ -147,6 +147,30 @@ def test_slow_grains_of_a_bed_that_sleeps_are_shown_beside_those_awake():
     progress.stage("robot", total=1.0)
     show_bed(progress, bed)
     assert progress.bed_words == ["768 grains", "100 % awake", "50 % slow"]
+
+
+def test_a_run_with_sleep_states_what_it_saved_and_that_it_saved_next_to_nothing(tmp_path, monkeypatch):
+    """No grain is slow for the first sqrt(d / g) = 25 ms."""
+    monkeypatch.setattr(RobotOnBed, "prepare", lambda *_: grain_bed())
+    monkeypatch.setattr(RobotOnBed, "check", lambda _: None)
+    monkeypatch.setattr("experiments.runs.whole_runs.write_report", lambda *_: None)
+    progress, said = Progress(), []
+    monkeypatch.setattr(progress, "message", said.append)
+    given = ON_BED | {"grain": 0.006, "bed_size": (0.096, 0.096, 0.05), "duration": 0.012, "height": 0.003}
+    result = robot.run(RobotSettings(**given, frame_count=0, sleep=True), tmp_path, progress=progress)
+    own = [one for one in result["departures"]["sentences"] if "leep" in one]
+    assert own == [one for one in said if one in own] and len(own) == 2
+    assert "100% of" in own[0] and "0 of 768" in own[0]
+
+
+def test_a_bed_of_which_a_part_sleeps_states_how_many_grains_do():
+    """1,000 grains, 10 exchanges of 10 steps after the placement's 5: 40,000 of 100,000 grain-steps."""
+    bed = SimpleNamespace(grain_count=1000, sleeper=SimpleNamespace(awake=300, fast=100))
+    master = SimpleNamespace(count=15)
+    run = SimpleNamespace(master=master, placing_steps=5, samples={"grain_steps": np.array([5e4, 7e4, 9e4])})
+    (said,) = sleep_words(RobotSettings(**ON_BED, sleep=True, substeps=10), run, bed)
+    assert "40% of" in said and "700 of 1,000" in said and "200 are slow" in said
+    assert sleep_words(RobotSettings(**ON_BED), run, bed) == []
 
 
 def test_a_preparation_is_expected_to_last_longer_in_less_gravity_and_a_robot_is_not_set_down():

@@ -3,12 +3,13 @@
 import pytest
 
 from experiments.cli.main import main
-from experiments.grains.staged import LOWERED
+from experiments.grains.staged import lowering_time
 from experiments.robot.forms import MOST_INERTIA
-from experiments.robot.on_grains import DEEPER, RobotFollowed, RobotOnBed, report_seconds
+from experiments.robot.on_grains import DEEPER, PACE, RobotFollowed, RobotOnBed, report_seconds
 from experiments.robot.plan import plan_robot
 from experiments.robot.result import conclude
 from experiments.robot.settings import RobotSettings
+from experiments.runs.pace import keep_pace
 from experiments.runs.progress import Progress
 
 pytest.importorskip("mujoco", reason="mujoco is not installed: pip install 'hedgebed[mujoco]'")
@@ -95,8 +96,10 @@ def test_the_modulus_is_stated_and_one_that_is_too_small_is_warned_of_with_the_o
 def test_the_work_and_the_plan_have_the_rest_in_a_lowered_gravity_and_the_pictures():
     same, lowered = on_bed(gravity=0.1), on_bed(gravity=0.1, settle_gravity=10.0)
     assert list(lowered.costs) == ["bed", "lower gravity", "robot"] and list(same.costs) == ["bed", "robot"]
-    assert lowered.costs["lower gravity"] == pytest.approx(LOWERED * (0.012 / 10.0) ** 0.5)
-    assert "with pictures" in lowered._work()
+    expected = lowering_time(10.0, 0.1, grain=0.012)
+    assert lowered.costs["lower gravity"] == expected
+    minutes = lowered.grain_count() * expected / lowered.time_step() / (60e6 * PACE)
+    assert f"{minutes:.2g} min, and" in lowered._work() and "gravity" not in same._work()
     bare = on_bed(frame_count=0)
     assert "without pictures" in bare._work()
     assert report_seconds(bare.settings) < report_seconds(lowered.settings)
@@ -113,3 +116,14 @@ def test_steps_of_mujoco_that_are_shorter_than_those_of_the_model_are_stated_in_
     assert main(["mujoco", str(tmp_path / "ball.xml"), *given]) == 0
     lines = [line for line in capsys.readouterr().err.splitlines() if "shorter than the" in line]
     assert len(lines) == told and all("0.4 ms" in line and "0.5 ms" in line for line in lines)
+
+
+def test_the_work_and_the_time_to_go_are_by_the_pace_of_this_machine_once_it_is_known(tmp_path, monkeypatch):
+    monkeypatch.setattr("experiments.runs.pace._file", lambda: tmp_path / "pace.json")
+    before = on_bed(threads=2)
+    assert before.seconds_per_second is None and "of one core" in before._work()
+    keep_pace("cpu-2", grains=before.grain_count(), rate=6e6)
+    known = on_bed(threads=2)
+    assert known.seconds_per_second == pytest.approx(known.grain_count() / known.time_step() / 6e6)
+    assert all(part in known._work() for part in ("at 6 million", "measured on"))
+    assert on_bed(threads=4).pace is None

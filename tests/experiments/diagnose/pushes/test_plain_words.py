@@ -1,10 +1,13 @@
 """What a diagnosis of pushes says to one who predicts: shares of the force, misfit held out, the foot's size."""
 
+import json
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from experiments.diagnose.push.remarks import Push, facts
-from experiments.diagnose.report.sentences import size_sentences
+from experiments.diagnose.report.sentences import size_sentences, worse_sentences
 from experiments.diagnose.report.summary import _allowed, summary_sentences, title_words
 from experiments.diagnose.report.to_use import number_words, unloading_sentences
 
@@ -22,7 +25,7 @@ def test_an_effect_that_holds_much_of_the_force_is_not_called_small_though_a_ref
     sizes = [LARGE, hardening(own)]
     title = title_words({"verdict": "named", "effects": [{"id": s["effect"]} for s in sizes], "sizes": sizes})
     (words,) = size_sentences({"sizes": sizes})
-    assert ("small" in title) is ("is small" in words) is small
+    assert ("small" in title) is ("which is small" in words) is small
     assert f"adds {own:g} N" in words and "of 18 mm" in words and "24.3 N" in words
     if small:
         assert "2.1 %" in title and "at 18 mm" in title
@@ -47,7 +50,7 @@ def test_what_held_out_trials_say_of_a_prediction_is_in_newtons(gap, predicts):
     ("rule", "held_out", "more", "words"),
     [
         ("small_gap", 1.1, {}, "the held-out gap is at most 1.2 ("),
-        ("small_gap", None, {"gap_with_scatter": {}}, "the gap is at most 1.2, with the scatter"),
+        ("small_gap", None, {"gap_with_scatter": {}}, "the gap with scatter is at"),
         ("closed", 5.0, {}, "remains on fitted and on held-out"),
         ("chance", 1.3, {"gate": {"held_out": {}}}, "on fitted and on held-out"),
         ("chance", 1.3, {"gate": {}}, "chance on fitted trials ("),
@@ -83,3 +86,24 @@ def test_the_stiffness_of_unloading_is_stated_in_n_m_with_the_error_of_both_numb
     assert number_words({"value": 1000.0, "std": error, "unit": "N/m"}) in said
     diagnosis["errors"]["names"] = ["stiffness@0.012", names[1]]
     assert unloading_sentences(diagnosis) == []
+
+
+def test_what_is_doubtful_stands_before_the_numbers_to_use():
+    """A C in doubt, a condition that gets worse and a number that may be 0 stood in the middle of sixty lines."""
+    found = json.loads((Path(__file__).parents[4] / "docs/results/diagnose-grains/diagnosis.json").read_text("utf-8"))
+    found |= {"kind": "penetration", "at_bounds": {"before": [], "after": []}}
+    found["remarks"] = ["C = 4.2 N s/m. Where the drive stops, the force falls as by another C"]
+    found["by_phase"][0] |= {"before": 1.0, "after": 9.0, "samples": 100}
+    found["effects"][0]["parameters"]["crater_share"]["std"] = 0.8
+    said = summary_sentences(found)
+    use = next(place for place, one in enumerate(said) if one.startswith("Use K"))
+    starts = ("Hard to believe", "It makes worse", "Not distinguished")
+    places = [place for start in starts for place, one in enumerate(said) if one.startswith(start)]
+    assert len(places) == 3 and places == sorted(places) and max(places) < use
+
+
+def test_two_samples_that_get_worse_by_chance_are_no_doubt():
+    """Mean squares of two samples scatter by 1: 2.8 is chance, 6 is not."""
+    row = {"phase": "free", "channel": "force", "held_out": False, "samples": 2, "before": 1.2, "after": 2.8}
+    assert worse_sentences({"by_phase": [row]}) == []
+    assert len(worse_sentences({"by_phase": [row | {"after": 6.0}]})) == 1

@@ -1,0 +1,47 @@
+"""A planned push that separates two models by less than beds differ is not called best; what separates them is said."""
+
+import pytest
+from golden import golden
+
+from experiments.diagnose.core.planned_pushes import (
+    chosen_push,
+    in_other_beds,
+    no_push_words,
+    pushes_needed,
+    separates,
+)
+from experiments.diagnose.fit.trials import Planned
+
+APART = {"depth_m": 0.024, "speed_m_s": 0.05, "one_N": 40.0, "other_N": 39.0, "one_std_N": 0.1, "other_std_N": 0.1,
+         "noise_N": 0.05}  # fmt: skip
+
+
+def test_a_difference_below_the_scatter_of_beds_separates_nothing():
+    """3 % of 40 N are 1.2 N: 1.96 of them are more than 1 N, which the noise alone would show."""
+    assert separates(in_other_beds(APART, {}))
+    wide = in_other_beds(APART, {"bed": 0.03})
+    assert wide["scatter_N"] == pytest.approx(1.2, abs=2e-3) and wide["one_std_N"] == pytest.approx(1.2042, abs=1e-3)
+    assert not separates(wide)
+    assert not separates(in_other_beds(APART, {"force zero": 0.6}))
+
+
+def test_the_mean_of_more_pushes_separates_them_unless_the_models_are_too_uncertain():
+    """n with 1.96² (2 x 0.1² + 1.2010² / n) < 1²: 6.004."""
+    assert pushes_needed(in_other_beds(APART, {"bed": 0.03})) == 7
+    assert pushes_needed(in_other_beds(APART | {"one_std_N": 0.6}, {"bed": 0.03})) is None
+    assert pushes_needed(in_other_beds(APART, {"bed": 0.2})) is None
+
+
+def test_the_sentence_says_that_no_push_would_and_what_would():
+    def words(apart):
+        plan = Planned({}, "push 24 mm deep at 50 mm/s", 3.0, 48, in_other_beds(apart, {"bed": 0.03}))
+        return no_push_words(plan, "depth-hardening", "layering", "Push once in a bed prepared anew.")
+
+    golden("diagnose/no_push", "\n".join([words(APART), words(APART | {"one_std_N": 0.6})]))
+
+
+def test_of_all_pushes_one_that_separates_beside_the_beds_is_taken_before_a_likelier_one():
+    likely, clear = Planned({}, "a", 9.0, 2, APART), Planned({}, "b", 3.0, 2, APART | {"other_N": 30.0})
+    plan = Planned({}, "a", 9.0, 2, APART, (likely, clear))
+    assert chosen_push(plan, {"bed": 0.03}).what == "b" and chosen_push(plan, {}).what == "a"
+    assert chosen_push(plan, {"bed": 0.5}).what == "a"
