@@ -6,6 +6,7 @@ from compliant ground (`experiments.hop.on_surface`); the result has both.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import asdict, replace
 
 from experiments.platform.ground_file import law_warnings, range_warnings, reached, with_kept_ground
@@ -43,6 +44,10 @@ OF_THE_LAW = (
     "model_distance", "speed_factor", "distance_factor", "model_escape_ratio",
 )  # fmt: skip
 """Quantities that depend on the law of the ground."""
+_ANSWER = (
+    "distance", "model_distance", "launch_speed", "model_launch_speed", "launch_angle", "model_launch_angle",
+)  # fmt: skip
+"""Quantities that a reader wants first, beside those that were asked for."""
 _SPREAD_OF = {"model_wheel_speed": "wheel speed", "model_launch_speed": "launch speed", "model_distance": "distance"}
 """Numbers whose spread a sentence states -> what it calls them."""
 
@@ -177,6 +182,7 @@ def _result(settings: HopSettings, plan: HopPlan, hop: Hop, given: SurfaceHop | 
         "escape_speed": quantity(escape, "m/s", "sqrt(2 g R)" if escape else "unknown without body_radius"),
         "escape_ratio": quantity(left.speed / escape if escape else None, "1", say("of_escape")),
     } | _model_quantities(plan, hop, given, escape)
+    quantities = {name: quantities[name] for name in sorted(quantities, key=_place_of(settings))}
     said = _sentences(plan, hop, given, speed=speed, by_brake=by_brake, sought=sought)
     others = otherwise(settings, plan, hop)
     early = [_spin_up(plan, speed=speed, most=spin_up)] if by_brake else []
@@ -218,6 +224,18 @@ def _result(settings: HopSettings, plan: HopPlan, hop: Hop, given: SurfaceHop | 
         },
         warnings=[*plan.warnings, *_warnings(plan, hop, given, escape)],
     )
+
+
+def _place_of(settings: HopSettings) -> Callable[[str], int]:
+    """The place of a quantity in the result: the answer first; what was given, as a wheel's speed, last."""
+    speeds = () if settings.asks_for == "wheel_speed" else ("wheel_speed", "model_wheel_speed")
+    last = "wheel_speed" if settings.asks_for == "wheel_speed" else "torque"
+
+    def place(name: str) -> int:
+        answer = (*speeds, *_ANSWER)
+        return answer.index(name) if name in answer else 100 + (name == last)
+
+    return place
 
 
 def _model_quantities(plan: HopPlan, hop: Hop, given: SurfaceHop | None, escape: float | None) -> dict[str, Json]:
