@@ -234,7 +234,7 @@ class RobotOnBed(RobotFollowed, OnLoweredBed[RobotSettings, RobotRun, RobotForec
         """The plan, whose words name K of the parts that go into the ground."""
         feet = zip(self._robot.feet, self.forecast.sunk, strict=True)
         plan = self.plan.standing_on(foot.parts[k].name for foot, sunk in feet for k in sunk)
-        return replace(plan, warnings=(*plan.warnings, *self._narrow()))
+        return replace(plan, warnings=(*plan.warnings, *self._narrow(), *self._few_grains()))
 
     def _narrow(self) -> list[str]:
         """A warning of a bed that is narrow for the widest foot that goes into the ground, as `penetrate` refuses."""
@@ -243,6 +243,16 @@ class RobotOnBed(RobotFollowed, OnLoweredBed[RobotSettings, RobotRun, RobotForec
         if min(s.bed_size[:2]) >= least * (1 - 1e-6):
             return []
         return [say("narrow_bed", s=s, wide=wide, least=least)]
+
+    def _few_grains(self) -> list[str]:
+        """A warning for each foot whose parts in the ground are all narrower than `FEWEST_ACROSS` grains."""
+        s = self.settings
+        least = FEWEST_ACROSS * s.grain * (1 - POLYGON)
+        return [
+            say("few_grains", s=s, name=foot.name, width=width, across=width / s.grain, most=width / FEWEST_ACROSS)
+            for foot, (width, _) in zip(self._robot.feet, self._standing, strict=True)
+            if width < least
+        ]
 
     def announce(self, progress: Progress) -> None:
         self.progress = progress
