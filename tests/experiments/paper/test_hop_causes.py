@@ -11,7 +11,10 @@ from experiments.cli.main import BAD_INPUT, DONE, main
 from experiments.hop.on_surface import hop_on_surface
 from rigid.hop import Tumbler, flight, launch
 from rigid.model.trial import Trial
+from vis.page.page import text
+from vis.page.report import Report
 from vis.paper.answer import answer_tiles
+from vis.paper.hop import write_hop_report
 
 CUBE = """
 format = "hedgebed-platform/1"
@@ -32,6 +35,7 @@ motor_torque = 0.3
 brake_torque = 12.6
 axes = [[0.0, 1.0, 0.0]]
 """
+pytestmark = pytest.mark.usefixtures("unreported")
 LENGTH = 0.125 * math.sqrt(2)
 
 
@@ -142,3 +146,11 @@ def test_a_hop_states_its_spin_up_and_what_it_depends_on(tmp_path, cube):
         left = launch(tumbler, 1.2e-3 * speed / 0.1, 0.1)
         assert flight(left.speed, left.angle, gravity=0.0057).distance == pytest.approx(2.0, rel=1e-3)
     golden("hop/cube", [*result["departures"]["sentences"], *(f"{t.label}: {t.value}" for t in answer_tiles(result))])
+
+
+def test_the_title_of_a_hops_pictures_has_one_line_and_names_the_ground(tmp_path, monkeypatch):
+    titles = []
+    monkeypatch.setattr(Report, "draw", lambda self, key, drawing, **_: titles.append(self.about) or text(key))
+    assert main(["hop", "--distance", "2", "--quiet", "--out", str(tmp_path / "run")]) == DONE
+    write_hop_report(tmp_path / "run")
+    assert set(titles) == {"Hedgehog: a hop of 2 m at 0.001 m/s2, rigid ground and brick"}
