@@ -56,7 +56,7 @@ class Tumbler(Coulomb):
     inertia: float  # J, without J_w [kg m2]
     spike_length: float  # l [m]
     lean: float = math.pi / 8  # Angle from the vertical of the line from the tips ahead to the centre, at rest [rad]
-    """pi / 8 is of eight rows, as the Hedgehog's. Of another platform give ``platform.stance().lean`` (cube: pi / 4)."""
+    """pi / 8 is of eight rows (Hedgehog). Of another platform give ``platform.stance().lean`` (cube: pi / 4)."""
     gravity: float = 0.0  # The weight on the ground over `mass_y` [m/s2]: g_sim in a rig
     mu_s: float = math.inf  # Coefficient of static friction [1]; infinite: the tips never slide
     mu_d: float | None = None  # Coefficient of sliding friction [1]; None: half of mu_s

@@ -153,4 +153,4 @@ def test_the_title_of_a_hops_pictures_has_one_line_and_names_the_ground(tmp_path
     monkeypatch.setattr(Report, "draw", lambda self, key, drawing, **_: titles.append(self.about) or text(key))
     assert main(["hop", "--distance", "2", "--quiet", "--out", str(tmp_path / "run")]) == DONE
     write_hop_report(tmp_path / "run")
-    assert set(titles) == {"Hedgehog: a hop of 2 m at 0.001 m/s2, rigid ground and brick"}
+    assert set(titles) == {"Hedgehog: a hop of 2 m at 0.001 m/s\N{SUPERSCRIPT TWO}, rigid ground and brick"}
