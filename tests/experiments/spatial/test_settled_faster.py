@@ -6,8 +6,7 @@ from golden import golden
 from pydantic import ValidationError
 from spatial_runs import CUBE, small_bed
 
-from experiments.grains.lowered_bed import PACE
-from experiments.grains.on_bed import PlatformOnBed
+from experiments.grains.on_bed import PACE, PlatformOnBed
 from experiments.runs.progress import Progress
 from experiments.spatial.on_grains import SpatialOnBed
 from experiments.spatial.settings import SpatialSettings

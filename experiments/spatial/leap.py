@@ -5,10 +5,10 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
+from experiments.grains.spells import spells
 from rigid.hop import flight
 
 from . import say
-from .spells import spells
 
 __all__ = ["Numbers", "leap_of"]
 
