@@ -14,7 +14,7 @@ mass = 4.2                     # kg
 inertia = [0.04, 0.04, 0.04]   # kg m2 about x, y, z
 [hull]
 shape = "rhombicuboctahedron"
-edge = 0.1378                  # m: 2 l sin(pi/8) for spikes that reach l = 0.18 m from the centre
+edge = 0.1378                  # m: 2 l sin(pi/8) for tips 0.18 m from the centre
 [wheels]
 inertia = 0.9e-3               # kg m2
 max_speed = 1050.0             # rad/s
@@ -35,5 +35,5 @@ for speed in (50.0, 100.0):  # of the wheel [rad/s]
     numbers = hop.run(settings, out / f"hop-{speed:g}")["quantities"]
     print(f"{speed:g} rad/s:", *(f"{name} = {numbers[name]['value']:.3g} m" for name in ("distance", "model_distance")))
 
-assert abs(length - 0.18) < 1e-4 and robot.spike_count == 24, "the robot is the one in the file"
+assert abs(length - 0.18) < 1e-4 and len(robot.tips) == 24, "the robot is the one in the file"
 assert run.energy_residual < 1e-4 and run.theta[-1] > 0.5, "it tumbles"
