@@ -10,9 +10,15 @@ and while they slide back under F = mu_d N
 
     (J + M l^2 s (s + mu_d c)) omega' = tau - l (s + mu_d c) (W - M l c omega^2)
 
-with N = W + M y'', y'' = l (s omega' - c omega^2). The platform leaves where N comes to 0. This is the planar model
-(Reid and others, i-SAIRAS 2014, from its energies) for K to infinity. A compliant ground launches more steeply where
-tips hold, and faster where they slide.
+with N = W + M y'', y'' = l (s omega' - c omega^2). The platform leaves where N comes to 0. A compliant ground launches
+more steeply where tips hold, and faster where they slide.
+
+Limit. This is the planar model (Reid and others, i-SAIRAS 2014, from its energies) for K to infinity with a C that
+leaves no rebound, with one exception. Under a sudden torque the model's tips slide first: the friction that holds them
+is needed at once, and the force of a spring, however stiff, takes time. Where mu_d < m c / (M s) they never stick
+again, also where mu_s is enough to hold them here. Rigid bodies have both motions as solutions. `launch` takes the one
+that sticks; with mu_s = mu_d it has the other, the model's limit. Under a torque that rises slowly the model's tips can
+hold too.
 
 Angles. In a sudden launch the ground gives one impulse within its cone of friction. So a launch whose tips do not slide
 cannot be flatter than pi/2 - atan(mu_s). This friction-cone condition is ours. It is not compared with the hop angles
@@ -50,6 +56,7 @@ class Tumbler(Coulomb):
     inertia: float  # J, without J_w [kg m2]
     spike_length: float  # l [m]
     lean: float = math.pi / 8  # Angle from the vertical of the line from the tips ahead to the centre, at rest [rad]
+    """pi / 8 is of eight rows (Hedgehog). Of another platform give ``platform.stance().lean`` (cube: pi / 4)."""
     gravity: float = 0.0  # The weight on the ground over `mass_y` [m/s2]: g_sim in a rig
     mu_s: float = math.inf  # Coefficient of static friction [1]; infinite: the tips never slide
     mu_d: float | None = None  # Coefficient of sliding friction [1]; None: half of mu_s
@@ -76,6 +83,15 @@ class Tumbler(Coulomb):
     def tipping_torque(self) -> float:
         """Least torque that tips it from rest [N m]: W l sin(lean)."""
         return self.weight * self.spike_length * math.sin(self.lean)
+
+    @property
+    def slip_torque(self) -> float:
+        """Least torque that makes it slip at rest if it is there at once [N m]: mu_s W (J + m h^2) / (m h).
+
+        h = l cos(lean), the height of the centre.
+        """
+        h = self.spike_length * math.cos(self.lean)
+        return self.mu_s * self.weight * (self.inertia + self.mass * h * h) / (self.mass * h)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -127,8 +143,10 @@ def launch(tumbler: Tumbler, torque: float, until: float = math.inf) -> Launch |
     """Launch under a constant `torque` [N m] on the platform from rest up to `until` [s] and none after.
 
     None where it does not leave the ground before the next tips come down: it tumbles, falls back, or does not tip at
-    all. Raises ValueError for a torque or a time of 0 or less. Raises RuntimeError where sliding on rigid ground has no
-    solution because friction is too high (above about 2, in a rig). Raises UnfitSettingsError for too large a torque.
+    all. After a brake it tumbles if M l cos(beta) omega^2 stays below W, as in a rig, where W is large. Compliant
+    ground may then still throw it: its springs return energy. Raises ValueError for a torque or a time of 0 or less.
+    Raises RuntimeError where sliding on rigid ground has no solution because friction is too high (above about 2, in a
+    rig). Raises UnfitSettingsError for too large a torque.
     """
     check_above_zero(torque=torque, **({"until": until} if until != math.inf else {}))
     if torque <= tumbler.tipping_torque:

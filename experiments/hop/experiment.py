@@ -6,9 +6,10 @@ from compliant ground (`experiments.hop.on_surface`); the result has both.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import asdict, replace
 
-from experiments.platform.ground_file import law_warnings, range_warnings, with_kept_ground
+from experiments.platform.ground_file import law_warnings, range_warnings, reached, with_kept_ground
 from experiments.platform.law_spread import (
     Answer,
     moved,
@@ -26,12 +27,13 @@ from experiments.runs.result import Result, quantities_of, quantity
 from experiments.runs.types import Json
 from experiments.runs.whole_runs import computed_run
 from experiments.tumble.result import trajectory_columns
-from rigid.hop import Flight, Launch, escape_speed, impulsive_launch, launch_speed_for, least_viable_angle
+from rigid.hop import Flight, Launch, escape_speed, impulsive_launch, launch, launch_speed_for, least_viable_angle
 from rigid.model.trial import Trial
 from rigid.planar.simulate import simulate
 
 from .numbers import HopPlan, plan_on
 from .on_surface import SurfaceHop, flight_path, hop_on_surface, hop_trial, wheel_speed_on_surface
+from .otherwise import otherwise, otherwise_words
 from .search import Hop, find_hop, longest_flight
 from .settings import HopSettings, say
 
@@ -42,6 +44,10 @@ OF_THE_LAW = (
     "model_distance", "speed_factor", "distance_factor", "model_escape_ratio",
 )  # fmt: skip
 """Quantities that depend on the law of the ground."""
+_ANSWER = (
+    "distance", "model_distance", "launch_speed", "model_launch_speed", "launch_angle", "model_launch_angle",
+)  # fmt: skip
+"""Quantities that a reader wants first, beside those that were asked for."""
 _SPREAD_OF = {"model_wheel_speed": "wheel speed", "model_launch_speed": "launch speed", "model_distance": "distance"}
 """Numbers whose spread a sentence states -> what it calls them."""
 
@@ -78,16 +84,22 @@ def _on_given_ground(settings: HopSettings, plan: HopPlan, hop: Hop) -> tuple[Su
     if settings.actuator != "brake" or plan.distance is None:
         return given, None
     return given, wheel_speed_on_surface(
-        trial, given, distance=plan.distance, max_speed=plan.wheel.max_speed, longest=longest, radius=radius
+        trial,
+        given,
+        distance=plan.distance,
+        max_speed=plan.wheel.max_speed,
+        longest=longest,
+        radius=radius,
+        brake_time=plan.brake_time,
     )
 
 
 def _with_the_law_s(
-    settings: HopSettings, plan: HopPlan, hop: Hop, best: dict[str, Json]
+    settings: HopSettings, plan: HopPlan, hop: Hop, best: dict[str, Json], *, beyond: bool
 ) -> tuple[dict[str, Json], Json, str]:
     """The quantities `best` with the standard deviation that follows from those of the law's parameters.
 
-    Also ``law_spread`` of the result, and a sentence.
+    Also ``law_spread`` of the result, and a sentence. `beyond` the range of the law no number has any.
     """
     escape = best["escape_speed"]["value"]
 
@@ -100,15 +112,20 @@ def _with_the_law_s(
         return answer_of(replace(plan, stiffness=value) if name == "stiffness" else replace(plan, damping=value))
 
     of_the_law = {name: entry["value"] for name, entry in best.items() if name in OF_THE_LAW}
-    if plan.fitted is not None:
+    if beyond and plan.fitted is not None:
+        parameters, law, stds = [name for name, _, _ in moved(plan.fitted)], "file", dict.fromkeys(of_the_law)
+    elif plan.fitted is not None:
         law, parameters = "file", [name for name, _, _ in moved(plan.fitted)]
         stds = spread_of_law(plan.fitted, lambda file: answer_of(plan_on(plan, file)), of_the_law)
     else:
         uncertain = uncertain_of(plan.numbers, find_surface(plan.surface))
         law, parameters = "", [one.name for one in uncertain]
-        stds = spread_of_surface(uncertain, of_surface, of_the_law)
+        stds = dict.fromkeys(of_the_law) if beyond else spread_of_surface(uncertain, of_surface, of_the_law)
     found = with_spread(best, stds) if plan.fitted is not None or parameters else best
-    return found, *spread_entries(found, _SPREAD_OF, surface=plan.surface, law=law, parameters=parameters)
+    entries = spread_entries(
+        found, _SPREAD_OF, surface=plan.surface, law=law, parameters=parameters, beyond=beyond and bool(parameters)
+    )
+    return found, *entries
 
 
 def _trial(settings: HopSettings, plan: HopPlan, hop: Hop) -> Trial | None:
@@ -135,7 +152,8 @@ def _result(settings: HopSettings, plan: HopPlan, hop: Hop, given: SurfaceHop | 
     speed = hop.effort if by_brake else min(torque * left.time / wheel.inertia, wheel.max_speed)
     radius = settings.body_radius
     escape = escape_speed(settings.gravity, radius) if radius is not None else None
-    sudden = impulsive_launch(tumbler, wheel.inertia)
+    sudden, spin_up = impulsive_launch(tumbler, wheel.inertia), min(tumbler.slip_torque, tumbler.tipping_torque)
+    spin_up = min(spin_up, wheel.motor_torque)
     wanted = None
     if flown is not None:
         wanted = launch_speed_for(flown.distance, sudden.angle, gravity=settings.gravity, radius=radius)
@@ -150,6 +168,8 @@ def _result(settings: HopSettings, plan: HopPlan, hop: Hop, given: SurfaceHop | 
         "model_wheel_speed": quantity(sought, "rad/s", note),
         "wheel_speed_impulsive": quantity(wanted / sudden.speed if wanted else None, "rad/s", lands or say("closed")),
         "torque": quantity(torque, "N m", "on the platform, constant"),
+        "spin_up_torque": quantity(spin_up if by_brake else None, "N m", say("of_spin_up_torque")),
+        "spin_up_time": quantity(wheel.inertia * speed / spin_up if by_brake else None, "s", say("of_spin_up_time")),
         "torque_time": quantity(driven, "s", say("of_torque_time")),
         "rotation": quantity(left.rotation, "rad", say("of_rotation")),
         "launch_speed": quantity(left.speed, "m/s", say("of_launch_speed")),
@@ -162,10 +182,16 @@ def _result(settings: HopSettings, plan: HopPlan, hop: Hop, given: SurfaceHop | 
         "escape_speed": quantity(escape, "m/s", "sqrt(2 g R)" if escape else "unknown without body_radius"),
         "escape_ratio": quantity(left.speed / escape if escape else None, "1", say("of_escape")),
     } | _model_quantities(plan, hop, given, escape)
+    quantities = {name: quantities[name] for name in sorted(quantities, key=_place_of(settings))}
     said = _sentences(plan, hop, given, speed=speed, by_brake=by_brake, sought=sought)
+    others = otherwise(settings, plan, hop)
+    early = [_spin_up(plan, speed=speed, most=spin_up)] if by_brake else []
+    said[1:1] = [*early, *filter(None, [otherwise_words(settings, others)])]
     law: Json = {"parameters": []}
     if given is not None:
-        quantities, law, sentence = _with_the_law_s(settings, plan, hop, quantities)
+        quantities, law, sentence = _with_the_law_s(
+            settings, plan, hop, quantities, beyond=plan.of_earth or bool(_out_of_range(plan, given))
+        )
         said.append(sentence)
     asked = {"distance": f"of {plan.distance or 0:g} m", "wheel_speed": f"from {settings.wheel_speed_0 or 0:g} rad/s"}
     asked["torque"] = f"by {settings.torque or 0:g} N m"
@@ -185,6 +211,7 @@ def _result(settings: HopSettings, plan: HopPlan, hop: Hop, given: SurfaceHop | 
         surface=plan.surface,
         departures={"sentences": said},
         law_spread=law,
+        otherwise=others,
         platform={
             "name": plan.platform.name,
             "mass": plan.platform.mass,
@@ -197,6 +224,18 @@ def _result(settings: HopSettings, plan: HopPlan, hop: Hop, given: SurfaceHop | 
         },
         warnings=[*plan.warnings, *_warnings(plan, hop, given, escape)],
     )
+
+
+def _place_of(settings: HopSettings) -> Callable[[str], int]:
+    """The place of a quantity in the result: the answer first; what was given, as a wheel's speed, last."""
+    speeds = () if settings.asks_for == "wheel_speed" else ("wheel_speed", "model_wheel_speed")
+    last = "wheel_speed" if settings.asks_for == "wheel_speed" else "torque"
+
+    def place(name: str) -> int:
+        answer = (*speeds, *_ANSWER)
+        return answer.index(name) if name in answer else 100 + (name == last)
+
+    return place
 
 
 def _model_quantities(plan: HopPlan, hop: Hop, given: SurfaceHop | None, escape: float | None) -> dict[str, Json]:
@@ -256,7 +295,10 @@ def _sentences(
     ]  # fmt: skip
     if by_brake and left.time < plan.wheel.inertia * speed / torque * (1 - 1e-9):
         said.append(say("leaves_early"))
-    said.append(_on_ground(plan, hop, given))
+    said.append(_on_ground(plan, hop, given, by_brake=by_brake))
+    of_surface = "stiffness" in plan.numbers and plan.numbers["stiffness"].origin.startswith("surface ")
+    if given is not None and of_surface and not find_surface(plan.surface).granular:
+        said.append(say("spikes_give", plan=plan, deep=1e3 * reached(given.trajectory)["depth"]))
     if by_brake and plan.distance is not None and sought is None and given is not None:
         most = "" if math.isinf(plan.wheel.max_speed) else f" up to {plan.wheel.max_speed:g} rad/s"
         said.append(say("no_wheel_speed", most=most, plan=plan))
@@ -265,12 +307,21 @@ def _sentences(
     return said
 
 
+def _spin_up(plan: HopPlan, *, speed: float, most: float) -> str:
+    """How fast the wheel may be spun up to `speed` [rad/s] by at most `most` [N m] without a motion of the platform."""
+    tumbler = plan.tumbler
+    time, share = plan.wheel.inertia * speed / most, 100 * most / plan.wheel.motor_torque
+    if most >= plan.wheel.motor_torque:
+        return say("spin_up_by_motor", time=time, speed=speed, most=most)
+    of_motor = f", {share:.2g} % of the motor's" if share > 0 else ""
+    return say("spin_up", time=time, speed=speed, most=most, of_motor=of_motor, t=tumbler)
+
+
 def _warnings(plan: HopPlan, hop: Hop, given: SurfaceHop | None, escape: float | None) -> list[str]:
     """Warnings on the error of rigid ground, and on a launch near the escape speed."""
     found, left, flown = [], hop.launch, hop.flight
     if given is not None:
-        of_grains = {"gravity": plan.tumbler.gravity, "diameter": plan.tip_diameter}
-        found += range_warnings(plan.fitted, given.trajectory, **of_grains) + law_warnings(plan.fitted)
+        found += _out_of_range(plan, given) + law_warnings(plan.fitted)
     other = given.launch if given is not None else None
     if given is None:
         found.append(say("taken_as_rigid", plan=plan))
@@ -292,7 +343,13 @@ def _warnings(plan: HopPlan, hop: Hop, given: SurfaceHop | None, escape: float |
     return found
 
 
-def _on_ground(plan: HopPlan, hop: Hop, given: SurfaceHop | None) -> str:
+def _out_of_range(plan: HopPlan, given: SurfaceHop) -> list[str]:
+    """One warning for each number of the hop that is outside the range of the law."""
+    of_grains = {"gravity": plan.tumbler.gravity, "diameter": plan.tip_diameter}
+    return range_warnings(plan.fitted, given.trajectory, **of_grains)
+
+
+def _on_ground(plan: HopPlan, hop: Hop, given: SurfaceHop | None, *, by_brake: bool) -> str:
     """Comparison of theory and model, and the reason of their difference if the numbers show it."""
     if given is None:
         return say("rigid_alone")
@@ -307,7 +364,20 @@ def _on_ground(plan: HopPlan, hop: Hop, given: SurfaceHop | None) -> str:
     faster, steeper = other.speed > (1 + ALIKE) * left.speed, other.angle - left.angle
     if left.slid and other.slid and faster and abs(steeper) <= SAME_ANGLE:
         return compared + say("into_speed")
+    if not left.slid and given.slides:
+        return compared + say("slides_there", mu_s=plan.tumbler.mu_s) + _if_it_slides(plan, hop, by_brake=by_brake)
     return compared + (say("thrown_up") if not left.slid and steeper > SAME_ANGLE else ".")
+
+
+def _if_it_slides(plan: HopPlan, hop: Hop, *, by_brake: bool) -> str:
+    """The launch from rigid ground whose static friction is as small as the sliding one; "." if there is none."""
+    sliding = replace(plan.tumbler, mu_s=plan.tumbler.sliding_friction, mu_d=plan.tumbler.sliding_friction)
+    turning = hop.effort if by_brake else plan.wheel.max_speed
+    try:
+        left = launch(sliding, hop.torque, plan.wheel.inertia * turning / hop.torque)
+    except RuntimeError:
+        return "."
+    return "." if left is None else say("slid_alike", left=left, angle=math.degrees(left.angle))
 
 
 run, resume = computed_run("hop", HopSettings, _compute, check=check)

@@ -10,6 +10,7 @@ from experiments.platform.numbers import platform_numbers
 from experiments.platform.settled import (
     Number,
     Settled,
+    beyond_brake,
     check_spike_length,
     defaults_said,
     of_earth,
@@ -39,6 +40,7 @@ class HopPlan:
     surface: str
     stiffness: float  # K of a row [N/m]
     damping: float  # C of a row [N s/m]
+    brake_time: float | None  # in which the brake stops the wheel [s]; None: its torque is given
     spike_count: int | None  # rows of tips for the planar model; None where they are not at equal angles
     distance: float | None  # how far to hop [m]; None where that is what is asked
     numbers: Mapping[str, Number]
@@ -46,6 +48,7 @@ class HopPlan:
     warnings: tuple[str, ...] = ()
     fitted: GroundFile | None = None  # the file that the law comes from
     tip_diameter: float = 0.0  # of the platform [m]
+    of_earth: bool = False  # whether K is that of grains at 1 g, and the grains are under a much smaller gravity
 
     @property
     def law(self) -> Ground | None:
@@ -86,9 +89,10 @@ def plan_hop(settings: HopSettings, platform_file: Path | None = None) -> HopPla
     numbers.settle("lean", of_platform.lean, f"platform {of_platform.name}")
     numbers.settle_limits(of_platform)
     own, brake = platform.wheel(), of_platform.brake_words
-    if settings.actuator == "brake":
+    brake_time = numbers.settle_brake_time(settings.actuator, of_platform)
+    if settings.actuator == "brake" and brake_time is None:
         numbers.settle("torque", own.brake_torque, f"{brake} of platform {of_platform.name}, at its largest")
-    elif settings.torque is not None:
+    elif settings.torque is not None and brake_time is None:
         numbers.settle("torque", settings.torque, "given")
     fitted = fitted_ground(settings.ground)
     surface, warnings = numbers.settle_surface(settings.surface, fitted=fitted, row_of=SPIKES_PER_ROW)
@@ -105,9 +109,11 @@ def plan_hop(settings: HopSettings, platform_file: Path | None = None) -> HopPla
     own_numbers: Json = {name: numbers.value(name) for name in body if name in numbers}
     Trial(gravity_sim=settings.gravity, gravity=settings.gravity, **own_numbers)  # refuses what no body can have
     warnings += numbers.check_actuation(settings.actuator, of_platform) + numbers.check_body(of_platform)
+    mass, earth = numbers.value("mass"), []
     if fitted is None:
-        mass = numbers.value("mass")
-        warnings += of_earth(numbers, surface, weight=mass * settings.gravity, mass=mass, counterweight=0.0)
+        earth = of_earth(numbers, surface, weight=mass * settings.gravity, mass=mass, counterweight=0.0)
+    if brake_time is not None and settings.wheel_speed_0 and wheel.inertia == of_platform.wheel_inertia:
+        warnings += beyond_brake(wheel.inertia * settings.wheel_speed_0 / brake_time, of_platform)
     tumbler = Tumbler(
         mass=numbers.value("mass"), inertia=numbers.value("inertia"), spike_length=numbers.value("spike_length"),
         lean=of_platform.lean, gravity=settings.gravity, mu_s=numbers.value("mu_s"), mu_d=numbers.value("mu_d"),
@@ -120,9 +126,10 @@ def plan_hop(settings: HopSettings, platform_file: Path | None = None) -> HopPla
     return HopPlan(
         platform=platform, wheel=wheel, brake=brake, tumbler=tumbler, surface=surface,
         stiffness=own_numbers.get("stiffness", 0.0), damping=own_numbers.get("damping", 0.0),
-        spike_count=of_platform.spike_count, fitted=fitted, tip_diameter=of_platform.spike_diameter,
+        brake_time=brake_time, spike_count=of_platform.spike_count, fitted=fitted,
+        tip_diameter=of_platform.spike_diameter,
         distance=numbers.value("distance") if settings.asks_for == "distance" else None, numbers=numbers,
-        choices=choices, warnings=tuple(warnings),
+        choices=choices, warnings=(*warnings, *earth), of_earth=bool(earth),
     )  # fmt: skip
 
 

@@ -33,6 +33,7 @@ class SurfaceHop:
     launch: Launch | None  # None: it does not leave the ground for good
     flight: Flight | None  # None: it does not leave the ground, or does not come down
     trajectory: Trajectory  # from the start of the torque until a little after it has left
+    slides: bool = False  # whether no tip stuck from the start of the torque until it left
 
 
 def hop_trial(plan: HopPlan, *, torque: float, wheel_speed: float | None) -> Trial | None:
@@ -79,6 +80,7 @@ def hop_on_surface(trial: Trial, *, expected_time: float, longest: float, radius
     vx = float(middle.vx[0])
     vy = float(middle.vy[0]) + trial.gravity_sim * (0.5 * (left + down) - left)
     before = next((state for time, state in reversed(changes) if time < left), "stand")
+    slides = {state for time, state in changes if 0 <= time < left} <= {"stand", "slip", "hop"} and before == "slip"
     angle = math.atan2(vy, vx)
     launch = Launch(
         speed=math.hypot(vx, vy), angle=angle, spin=float(middle.omega[0]), slid=before == "slip",
@@ -87,17 +89,25 @@ def hop_on_surface(trial: Trial, *, expected_time: float, longest: float, radius
     if not 0 <= angle <= math.pi:
         return SurfaceHop(launch=None, flight=None, trajectory=trajectory)
     flown = flight(launch.speed, angle, gravity=trial.gravity_sim, radius=radius)
-    return SurfaceHop(launch=launch, flight=flown, trajectory=trajectory)
+    return SurfaceHop(launch=launch, flight=flown, trajectory=trajectory, slides=slides)
 
 
 def wheel_speed_on_surface(
-    trial: Trial, start: SurfaceHop, *, distance: float, max_speed: float, longest: float, radius: float | None
+    trial: Trial,
+    start: SurfaceHop,
+    *,
+    distance: float,
+    max_speed: float,
+    longest: float,
+    radius: float | None,
+    brake_time: float | None = None,
 ) -> float | None:
     """The speed [rad/s] of a braked wheel whose hop from this ground goes `distance` [m], to 1e-4 of it.
 
     The launch speed of a short brake scales with the wheel's, the distance with its square: from the hop `start` that
     `trial` makes, the wheel's speed is scaled by sqrt(distance / found) until it fits. None where that fails within
-    `max_speed` [rad/s]: the platform leaves before a faster wheel has stopped, or not at all.
+    `max_speed` [rad/s]: the platform leaves before a faster wheel has stopped, or not at all. With a `brake_time` [s]
+    the torque follows the wheel's speed; without one it stays.
     """
     speed, found = trial.wheel_speed_0, start
     for _ in range(20):
@@ -111,7 +121,8 @@ def wheel_speed_on_surface(
         speed *= min(max(math.sqrt(distance / reached), 0.7), 1.5)
         if speed > max_speed:
             return None
-        faster = replace(trial, wheel_speed_0=speed)
+        torque = trial.torque if brake_time is None else trial.wheel_inertia * speed / brake_time
+        faster = replace(trial, wheel_speed_0=speed, torque=torque)
         found = hop_on_surface(faster, expected_time=found.launch.time, longest=longest, radius=radius)
     return None
 

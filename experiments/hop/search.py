@@ -17,12 +17,14 @@ from .numbers import HopPlan, plan_hop
 from .on_surface import hop_on_surface, hop_trial
 from .settings import HopSettings, say
 
-__all__ = ["Hop", "find_hop", "longest_flight"]
+__all__ = ["Hop", "Means", "find_hop", "hop_by", "longest_flight", "means_of"]
 
 SCAN = 80
 """Points between the least and the most that the actuator can do, to find where the distance lies."""
 SURFACE_SCAN = 6
 """Points among which the planar model's longest hop is found, for a refusal."""
+LEAST_HOP = 0.1
+"""A hop shorter than this share of the spike length is not stated in a refusal [1]."""
 HALVINGS = 8
 """How often the stretch between two of them is halved, where the distance lies in it."""
 GRAVITIES = 16
@@ -42,7 +44,7 @@ class Hop:
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Means:
+class Means:
     """Range of the actuator's effort."""
 
     leave: Callable[[float], Launch | None]
@@ -60,22 +62,35 @@ def find_hop(settings: HopSettings, platform_file: Path | None = None) -> tuple[
     """
     plan = plan_hop(settings, platform_file)
     try:
-        means = _means(plan, settings)
+        means = means_of(plan, settings)
     except _TooWeakError as error:
         raise ValueError(f"{error}{_other_gravity(settings, _possible, (0.5,))}") from None
     if settings.asks_for == "distance":
         return plan, _search(settings, plan, means)
     key, effort = ("wheel_speed_0", settings.wheel_speed_0) if settings.wheel_speed_0 else ("torque", settings.torque)
     assert effort is not None
-    found = _hop(settings, means, effort)
+    found = hop_by(settings, means, effort)
     if found is None:
         efforts = [float(each) for each in np.geomspace(means.least, means.most, SCAN)]
-        enough = next((each for each in efforts if _hop(settings, means, each) is not None), None)
+        enough = next((each for each in efforts if hop_by(settings, means, each) is not None), None)
         would = "nor does any other" if enough is None else f"from some {enough:.3g} {means.unit} on it does"
         where = say("where", t=plan.tumbler)
-        would += _other_gravity(settings, _possible, (0.5, 2.0))
+        would += _same_on_surface(settings, plan, means, effort) + _other_gravity(settings, _possible, (0.5, 2.0))
         raise ValueError(say("no_hop", key=key, effort=effort, unit=means.unit, where=where, would=would))
     return plan, found
+
+
+def _same_on_surface(settings: HopSettings, plan: HopPlan, means: Means, speed: float) -> str:
+    """Message on the planar model by a wheel at `speed` [rad/s] that is too slow for a hop from rigid ground; or ""."""
+    if settings.actuator != "brake" or plan.spike_count is None:
+        return ""
+    torque = means.torque(speed)
+    trial, braked = hop_trial(plan, torque=torque, wheel_speed=speed), plan.wheel.inertia * speed / torque
+    assert trial is not None
+    there = hop_on_surface(trial, expected_time=braked, longest=2 * braked + 2.0, radius=settings.body_radius)
+    if there.flight is None or there.flight.distance < LEAST_HOP * plan.tumbler.spike_length:
+        return ""
+    return say("hops_on_surface", plan=plan, flight=there.flight)
 
 
 def longest_flight(plan: HopPlan, left: Launch) -> float:
@@ -87,21 +102,22 @@ class _TooWeakError(ValueError):
     """A torque that does not tip the platform at this gravity."""
 
 
-def _possible(settings: HopSettings, plan: HopPlan, means: _Means) -> bool:
+def _possible(settings: HopSettings, plan: HopPlan, means: Means) -> bool:
     """Whether the hop that was asked for is possible on rigid ground."""
     if plan.distance is not None:
         found, _ = _seek(settings, means, plan.distance)
         return found is not None and _reaches(found, plan.distance)
     effort = settings.wheel_speed_0 or settings.torque
-    return effort is not None and _hop(settings, means, effort) is not None
+    return effort is not None and hop_by(settings, means, effort) is not None
 
 
-def _means(plan: HopPlan, settings: HopSettings) -> _Means:
+def means_of(plan: HopPlan, settings: HopSettings) -> Means:
+    """What the actuator can do. Raises ValueError where it cannot tip the platform."""
     return _by_brake(plan, settings) if settings.actuator == "brake" else _by_motor(plan, settings)
 
 
 def _other_gravity(
-    settings: HopSettings, works: Callable[[HopSettings, HopPlan, _Means], bool], factors: Sequence[float]
+    settings: HopSettings, works: Callable[[HopSettings, HopPlan, Means], bool], factors: Sequence[float]
 ) -> str:
     """For a refusal: the nearest gravity that `works`, each of `factors` taken once and more; "" if none is found."""
     for power in range(1, GRAVITIES + 1):
@@ -110,28 +126,34 @@ def _other_gravity(
             other = settings.model_copy(update={"gravity": gravity})
             try:
                 plan = plan_hop(other)
-                if works(other, plan, _means(plan, other)):
+                if works(other, plan, means_of(plan, other)):
                     return say("other_gravity", gravity=gravity)
             except (ValueError, RuntimeError):
                 continue
     return ""
 
 
-def _by_brake(plan: HopPlan, settings: HopSettings) -> _Means:
-    tumbler, wheel, torque = plan.tumbler, plan.wheel, plan.numbers["torque"].value
-    if torque <= tumbler.tipping_torque:
-        raise _too_weak("torque", torque, tumbler)
+def _by_brake(plan: HopPlan, settings: HopSettings) -> Means:
+    tumbler, wheel, time = plan.tumbler, plan.wheel, plan.brake_time
     most, limit = wheel.max_speed, "its largest speed"
     if math.isinf(most):
         most, limit = max(BEYOND * _impulsive_speed(plan, settings), settings.wheel_speed_0 or 0.0), "no limit known"
-    return _Means(
-        leave=lambda speed: brake_launch(tumbler, wheel.inertia * speed, torque), torque=lambda speed: torque,
-        least=1e-4 * most, most=most, unit="rad/s",
-        what=say("brake_means", plan=plan, torque=torque, most=most, limit=limit),
+
+    def torque(speed: float) -> float:
+        return plan.numbers["torque"].value if time is None else wheel.inertia * speed / time
+
+    if torque(most) <= tumbler.tipping_torque:
+        raise _too_weak("torque", torque(most), tumbler)
+    slowest = 0.0 if time is None else time * tumbler.tipping_torque / wheel.inertia * (1 + 1e-6)
+    what = "brake_means" if time is None else "timed_brake_means"
+    return Means(
+        leave=lambda speed: brake_launch(tumbler, wheel.inertia * speed, torque(speed)), torque=torque,
+        least=max(1e-4 * most, slowest), most=most, unit="rad/s",
+        what=say(what, plan=plan, torque=torque(most), most=most, limit=limit),
     )  # fmt: skip
 
 
-def _by_motor(plan: HopPlan, settings: HopSettings) -> _Means:
+def _by_motor(plan: HopPlan, settings: HopSettings) -> Means:
     tumbler, wheel = plan.tumbler, plan.wheel
     most, limit = wheel.motor_torque, "its largest"
     if math.isinf(most):
@@ -143,7 +165,7 @@ def _by_motor(plan: HopPlan, settings: HopSettings) -> _Means:
         raise _too_weak("the motor's torque", most, tumbler)
     if settings.torque is not None and settings.torque <= tumbler.tipping_torque:
         raise _too_weak("torque", settings.torque, tumbler)
-    return _Means(
+    return Means(
         leave=lambda torque: launch(tumbler, torque, wheel.inertia * wheel.max_speed / torque),
         torque=lambda torque: torque, least=tumbler.tipping_torque * (1 + 1e-6), most=most,
         what=say("motor_means", most=most, limit=limit), unit="N m",
@@ -164,7 +186,7 @@ def _impulsive_speed(plan: HopPlan, settings: HopSettings) -> float:
     return launch_speed_for(wanted, sudden.angle, gravity=gravity, radius=radius) / sudden.speed
 
 
-def _hop(settings: HopSettings, means: _Means, effort: float) -> Hop | None:
+def hop_by(settings: HopSettings, means: Means, effort: float) -> Hop | None:
     """The hop by this effort; None if it does not leave rigid ground."""
     try:
         left = means.leave(effort)
@@ -178,7 +200,7 @@ def _hop(settings: HopSettings, means: _Means, effort: float) -> Hop | None:
     )  # fmt: skip
 
 
-def _search(settings: HopSettings, plan: HopPlan, means: _Means) -> Hop:
+def _search(settings: HopSettings, plan: HopPlan, means: Means) -> Hop:
     """The smallest effort whose hop reaches the distance on rigid ground. Raises ValueError if none does."""
     distance = plan.distance
     assert distance is not None
@@ -201,11 +223,11 @@ def _reaches(found: Hop, distance: float) -> bool:
     return found.flight is not None and abs(found.flight.distance - distance) <= 1e-6 * distance
 
 
-def _seek(settings: HopSettings, means: _Means, distance: float) -> tuple[Hop | None, float]:
+def _seek(settings: HopSettings, means: Means, distance: float) -> tuple[Hop | None, float]:
     """The hop by the smallest effort that goes as far as `distance` or beyond, or None; and the longest one [m]."""
 
     def missed(effort: float) -> float:
-        found = _hop(settings, means, effort)
+        found = hop_by(settings, means, effort)
         if found is None:
             return -distance
         return (found.flight.distance if found.flight else math.inf) - distance
@@ -218,10 +240,10 @@ def _seek(settings: HopSettings, means: _Means, distance: float) -> tuple[Hop | 
     low, high = float(efforts[max(first - 1, 0)]), float(efforts[first])
     while high - low > 1e-13 * high and low < (middle := 0.5 * (low + high)) < high:  # halving gets over jumps too
         low, high = (middle, high) if missed(middle) < 0 else (low, middle)
-    return _hop(settings, means, high), math.inf
+    return hop_by(settings, means, high), math.inf
 
 
-def _on_surface(settings: HopSettings, plan: HopPlan, means: _Means) -> str:
+def _on_surface(settings: HopSettings, plan: HopPlan, means: Means) -> str:
     """Message on the planar model for a distance that is impossible on rigid ground."""
     by_brake, distance = settings.actuator == "brake", plan.distance
     assert distance is not None

@@ -4,7 +4,7 @@ from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
-from experiments.platform.settings import PlatformSettings, Positive
+from experiments.platform.settings import BRAKE_TIME, PlatformSettings, Positive, brake_time_fault
 from experiments.runs.strict import StrictSettings
 from rigid.ground_file import is_ground_file
 from vis.page.sentences import Sentences
@@ -33,6 +33,7 @@ class _Question(StrictSettings):
     torque: Positive | None = None
     """Torque on the platform [N m]. Of a brake: its largest if not given. Of a motor: instead of a distance, which is
     then computed."""
+    brake_time: Positive | None = Field(None, description=BRAKE_TIME)
 
 
 class HopSettings(PlatformSettings, _Question):
@@ -49,6 +50,8 @@ class HopSettings(PlatformSettings, _Question):
                 raise ValueError(say("no_ground", s=self))
             if key := next((key for key in ("stiffness", "damping") if getattr(self, key) is not None), None):
                 raise ValueError(say("of_the_spring_damper", key=key, value=getattr(self, key), s=self))
+        if fault := brake_time_fault(self.brake_time, self.torque, self.actuator):
+            raise ValueError(fault)
         if self.wheel_speed_0 is not None and self.actuator == "motor":
             raise ValueError(say("wheel_of_a_motor", s=self))
         if self.wheel_speed_0 is not None and self.distance is not None:

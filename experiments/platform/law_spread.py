@@ -4,7 +4,7 @@ The law is that of a ground file, or the spring-damper of a surface. Each parame
 alone, by +s and by -s, within what its law allows. The answer q is taken to be linear between: its standard deviation
 is the root of the sum of (s dq/dp)^2. Neither file states a covariance, so that the parameters count as independent.
 The error of the law itself is not in it. result.json has that standard deviation. Readers see 1.96 of it, half of a
-95 % interval.
+95 % interval. Beyond the range of a law nothing is known of its error there: no number has one.
 """
 
 import math
@@ -151,17 +151,21 @@ def spread_entries(
     law: str,
     parameters: Sequence[str],
     absent: Sequence[str] = (),
+    beyond: bool = False,
 ) -> tuple[Json, str]:
     """``law_spread`` of result.json, and a sentence with the halves of 95 % intervals that a law's parameters give.
 
     `names`: number -> what it is called. `law`: "" for K and C of a row, "file" for that of a ground file, or a name.
     `parameters`: which of it were moved. `absent`: numbers that some moved law does not have (`Seen.absent`).
+    `beyond`: whether the motion leaves the range of the law, so that no number has an interval.
     """
     of = say("of_file") if law == "file" else say("of_law", law=law)
     if not law:
         symbols = [_SYMBOLS[name] for name in parameters or _SYMBOLS]
         of = say("of_surface", names=" and ".join(symbols), surface=surface)
     entries: Json = {"parameters": list(parameters), "absent": list(absent)}
+    if beyond:
+        return entries | {"beyond": True}, say("beyond_spread", of=of)
     if not parameters:
         return entries, say("no_spread", of=of)
     told = [

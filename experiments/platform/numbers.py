@@ -44,6 +44,7 @@ class PlatformNumbers:
     wheel_inertia: float
     max_motor_torque: float
     brake_torque: float
+    brake_time: float | None  # in which the brake stops the wheel from any speed [s]; None: it has a torque
     max_wheel_speed: float
     spike_diameter: float  # of shafts and ball tips [m]; 0 where it has no spikes
     spike_clear: float  # how far a spike stands out of the hull, along itself [m]; 0 where it has none
@@ -51,7 +52,7 @@ class PlatformNumbers:
     @property
     def brake_words(self) -> str:
         """What slows the platform's wheel: a platform file without a brake_torque lets the motor do it."""
-        own = self.brake_torque > self.max_motor_torque or math.isinf(self.brake_torque)
+        own = self.brake_torque > self.max_motor_torque or math.isinf(self.brake_torque) or self.brake_time is not None
         return "the brake" if own else "the motor"
 
 
@@ -75,6 +76,7 @@ def platform_numbers(name: str, *, file: Path | None = None, in_plane: bool = Tr
         wheel_inertia=wheel.inertia,
         max_motor_torque=wheel.motor_torque,
         brake_torque=wheel.brake_torque,
+        brake_time=wheel.brake_time,
         max_wheel_speed=wheel.max_speed,
         spike_diameter=2 * platform.tip_radius,
         spike_clear=platform.spike_clear,

@@ -12,7 +12,10 @@ from experiments.runs.strict import NotNegative, Positive, StrictSettings
 
 from . import say
 
-__all__ = ["Assignments", "NotNegative", "PlatformSettings", "Positive"]
+__all__ = ["BRAKE_TIME", "Assignments", "NotNegative", "PlatformSettings", "Positive", "brake_time_fault"]
+
+BRAKE_TIME = """Time in which the brake stops the wheel [s], instead of torque, which is then wheel_inertia times the \
+speed of the wheel over it; that of the platform's file if it has one."""
 
 
 def _as_assignments(given: object) -> object:
@@ -68,3 +71,12 @@ class PlatformSettings(StrictSettings):
         if self.mu_s is not None and self.mu_d is not None and self.mu_d > self.mu_s:
             raise ValueError(say("mu_d_above_mu_s", s=self))
         return self
+
+
+def brake_time_fault(brake_time: float | None, torque: float | None, actuator: str) -> str | None:
+    """Message if a brake's time [s] is given with a torque [N m] or for a motor; else None."""
+    if brake_time is None:
+        return None
+    if torque is not None:
+        return say("brake_time_and_torque", brake_time=brake_time, torque=torque)
+    return None if actuator == "brake" else say("brake_time_of_a_motor", brake_time=brake_time)

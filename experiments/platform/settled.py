@@ -45,7 +45,7 @@ _OF_UNIT = {
     "N s/m": ("damping",),
     "1": ("mu_s", "mu_d"),
     "m/s2": ("gravity_sim", "gravity"),
-    "s": ("torque_until",),
+    "s": ("torque_until", "brake_time"),
 }
 _UNITS = {name: unit for unit, names in _OF_UNIT.items() for name in names}
 
@@ -194,9 +194,21 @@ class Settled(dict[str, Number]):
             whose = of_platform if strongest.origin != "given" else "max_motor_torque (given)"
             raise ValueError(say("beyond_motor", torque=torque, whose=whose, most=strongest.value))
         own = wheel.origin != "model" and wheel.value == platform.wheel_inertia
-        if actuator == "brake" and own and torque > platform.brake_torque * (1 + 1e-9):
-            return [say("beyond_brake", torque=torque, brake=platform.brake_words, platform=platform)]
+        return beyond_brake(torque, platform) if actuator == "brake" and own else []
+
+    def settle_brake_time(self, actuator: Literal["motor", "brake"], platform: PlatformNumbers) -> float | None:
+        """Settle the time in which a brake stops the wheel [s], unless a torque is given or the brake has one."""
+        own = platform.brake_time if self._settings.torque is None else None
+        if actuator != "brake" or (self._settings.brake_time is None and own is None):
+            return None
+        return self.settle("brake_time", own or math.nan, f"platform {platform.name}")
+
+
+def beyond_brake(torque: float, platform: PlatformNumbers) -> list[str]:
+    """A warning about a torque [N m] beyond the platform's own brake."""
+    if torque <= platform.brake_torque * (1 + 1e-9):
         return []
+    return [say("beyond_brake", torque=torque, brake=platform.brake_words, platform=platform)]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -60,7 +60,7 @@ class Where:
             if self.workers is not None:
                 raise ValueError(f"workers = {self.workers} are processes here: leave it out beside scheduler")
         elif (self.workers or 1) > 1:
-            required("distributed", f"workers = {self.workers}")
+            required("distributed", f"workers = {self.workers}", without="workers = 1 needs nothing more")
 
     def processes(self, costs: Sequence[float]) -> int:
         """How many processes here compute runs of these reckoned costs [s]: at least 1, at most one for each run.

@@ -20,16 +20,13 @@ from coupling.robot import BedFeet, LammpsFeet, MujocoRobot, RobotRun, by_region
 from coupling.robot.soles import plan_area
 from coupling.robot.stability import ExpectedBed, check_exchange
 from dem import Bed
-from experiments.grains.bed_progress import Stages
 from experiments.grains.following import Followed
 from experiments.grains.lammps import check_lammps, moved_to_lammps
-from experiments.grains.on_bed import Forecast, PlatformOnBed
-from experiments.grains.softening import Softening, run_limit
-from experiments.grains.staged import lower_gravity, lowering_time
+from experiments.grains.on_bed import PACE, Forecast, OnLoweredBed
+from experiments.grains.softening import run_limit
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
 from experiments.runs.result import Result
-from experiments.runs.stopping import held_back
 from rigid.spatial.quaternions import to_matrix
 
 from . import say
@@ -48,9 +45,6 @@ __all__ = ["RobotFollowed", "RobotForecast", "RobotOnBed", "report_seconds"]
 SEEN = 200  # Moments of the forecast at which the extent of the feet is taken
 WIDE = 4.0
 """Width of a bed over that of the widest foot below which a run starts with a warning [1]: of `hedgebed penetrate`."""
-PACE = 3.0
-"""Grain-steps in a second of processor time [1e6]: the leg for 1 s on 3,921 grains, 1.2e8 grain-steps, took 62 s with
-its bed on one core (docs/notes/mujoco.md). Sleep makes it less."""
 REPORT = {True: 45.0, False: 20.0}
 """Expected duration of a report with pictures and film on grains and on a law [s]; `CURVES` without pictures."""
 CURVES = 5.0
@@ -149,10 +143,8 @@ class RobotForecast(Forecast):
     sunk: tuple[tuple[int, ...], ...]  # Of each foot the numbers of its parts that go at least half as deep as it does
 
 
-class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotForecast]):
+class RobotOnBed(RobotFollowed, OnLoweredBed[RobotSettings, RobotRun, RobotForecast]):
     """A robot on a bed."""
-
-    lowering_stage = "lower gravity"  # What the progress calls the rest in the gravity of the run
 
     def __init__(self, settings: RobotSettings, plan: RobotPlan) -> None:
         super().__init__(settings, plan)
@@ -241,7 +233,7 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
         """The plan, whose words name K of the parts that go into the ground."""
         feet = zip(self._robot.feet, self.forecast.sunk, strict=True)
         plan = self.plan.standing_on(foot.parts[k].name for foot, sunk in feet for k in sunk)
-        return replace(plan, warnings=(*plan.warnings, *self._narrow()))
+        return replace(plan, warnings=(*plan.warnings, *self._narrow(), *self._few_grains()))
 
     def _narrow(self) -> list[str]:
         """A warning of a bed that is narrow for the widest foot that goes into the ground, as `penetrate` refuses."""
@@ -250,6 +242,16 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
         if min(s.bed_size[:2]) >= least * (1 - 1e-6):
             return []
         return [say("narrow_bed", s=s, wide=wide, least=least)]
+
+    def _few_grains(self) -> list[str]:
+        """A warning for each foot whose parts in the ground are all narrower than `FEWEST_ACROSS` grains."""
+        s = self.settings
+        least = FEWEST_ACROSS * s.grain * (1 - POLYGON)
+        return [
+            say("few_grains", s=s, name=foot.name, width=width, across=width / s.grain, most=width / FEWEST_ACROSS)
+            for foot, (width, _) in zip(self._robot.feet, self._standing, strict=True)
+            if width < least
+        ]
 
     def announce(self, progress: Progress) -> None:
         self.progress = progress
@@ -278,8 +280,7 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
 
     def _work(self) -> str:
         """Grains, steps and time of the run, its bed, the lowering of gravity and the report, in a sentence."""
-        count, step, pace = self.grain_count(), self.time_step(), self.pace
-        costs = {name: count * time / step / (60 * (pace or 1e6 * PACE)) for name, time in self.costs.items()}
+        count, step, pace, costs = self.grain_count(), self.time_step(), self.pace, self.minutes
         words = {"minutes": costs[self.stage], "bed": costs[self.bed_stage], "pace": 1e-6 * pace if pace else PACE}
         lowered = costs.get(self.lowering_stage)
         return say(
@@ -294,16 +295,6 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
         """Expected duration of the report [s]."""
         return report_seconds(self.settings)
 
-    @property
-    def costs(self) -> dict[str, float]:
-        """As of every bed, and the rest in the gravity of the run where the bed is prepared in more."""
-        found = dict(super().costs)
-        run = found.pop(self.stage)
-        if self.first_gravity != self.gravity:
-            grain = self.settings.grain
-            found[self.lowering_stage] = lowering_time(self.first_gravity, self.gravity, grain=grain)
-        return found | {self.stage: run}
-
     def check_exchange(self) -> float:
         """The load of the exchange at the start over the largest stable one [1], on the expected bed.
 
@@ -315,24 +306,6 @@ class RobotOnBed(RobotFollowed, PlatformOnBed[RobotSettings, RobotRun, RobotFore
         robot.start()
         bed = ExpectedBed(0.5 * s.grain, run_limit(s.max_overlap), grains, step, repeatable=s.ground != "lammps")
         return check_exchange(robot, bed, substeps=s.substeps, iterations=s.iterations)
-
-    @property
-    def first_gravity(self) -> float:
-        return self.settings.settle_gravity or self.gravity
-
-    def prepare(self, softening: Softening, progress: Progress) -> Bed:
-        """The prepared bed in the gravity of the run.
-
-        Rigid grains without cohesion pack alike in any gravity, and settle sqrt(g / g') times as fast in a larger one.
-        """
-        bed = super().prepare(softening, progress)
-        if self.first_gravity != self.gravity:
-            unit = math.sqrt(self.settings.grain / self.first_gravity)
-            with held_back() as asked_to_stop:
-                shown = Stages(progress, asked_to_stop)
-                shown.stage(self.lowering_stage, total=1.0)
-                lower_gravity(bed, self.gravity, unit=unit, progress=shown)
-        return bed
 
     def check(self) -> None:
         """Raise ValueError, naming key, value and what is accepted, for a bed that does not suit this robot."""

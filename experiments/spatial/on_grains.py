@@ -14,11 +14,13 @@ from typing import Any
 import numpy as np
 
 from coupling import BedGround, LawGround, SpatialRun, spatial_members
+from coupling.lowered_gravity import pace_under
 from coupling.members import Member
+from coupling.platform_run import PLACING_WAY, REST_TIME
 from dem import Bed
 from experiments.grains.following import Followed
 from experiments.grains.lammps import check_lammps
-from experiments.grains.on_bed import MARGIN, Forecast, PlatformOnBed
+from experiments.grains.on_bed import MARGIN, PACE, Forecast, OnLoweredBed
 from experiments.grains.softening import PUSHED
 from experiments.platform.settled import check_lengths
 from experiments.runs.progress import Progress
@@ -106,7 +108,7 @@ class SpatialForecast(Forecast):
     high: tuple[float, float]  # corners of where tips come down, x and y from the start [m]
 
 
-class SpatialOnBed(SpatialFollowed, PlatformOnBed[SpatialSettings, SpatialRun, SpatialForecast]):
+class SpatialOnBed(SpatialFollowed, OnLoweredBed[SpatialSettings, SpatialRun, SpatialForecast]):
     """A platform in space on a bed."""
 
     turns_freely = True
@@ -118,6 +120,28 @@ class SpatialOnBed(SpatialFollowed, PlatformOnBed[SpatialSettings, SpatialRun, S
         self.gravity = -float(plan.trial.weight[2]) / platform.mass
         self.counterweight = plan.trial.counterweight
         self.spike_diameter, self.reach = 2 * platform.tip_radius, platform.reach
+
+    def announce(self, progress: Progress) -> None:
+        super().announce(progress)
+        if self.settings.ground != "lammps":
+            progress.message(self._work())
+
+    def _work(self) -> str:
+        """Grains, steps and time of the run, of its bed and of the lowering of gravity, in a sentence."""
+        pace, minutes = self.pace, self.minutes
+        lowered = minutes.get(self.lowering_stage)
+        return say(
+            "work", count=self.grain_count(), steps=self.costs[self.stage] / self.time_step(),
+            minutes=minutes[self.stage], bed=minutes[self.bed_stage], pace=1e-6 * pace if pace else PACE,
+            of=say("as_measured" if pace else "of_one_core"),
+            lowered="" if lowered is None else say("lowered_takes", minutes=lowered),
+        )  # fmt: skip
+
+    @property
+    def placement_time(self) -> float:
+        """As on every bed, in the gravity of the run: it has fallen before the platform is set down."""
+        speed = self.lowering_speed
+        return 0.0 if speed is None else pace_under(self.grain_gravity) * REST_TIME + PLACING_WAY / speed
 
     @cached_property
     def forecast(self) -> SpatialForecast:

@@ -23,6 +23,7 @@ from rigid.platform.solids import Mesh, merge
 from rigid.spatial.quaternions import to_matrix
 
 from . import say
+from .leap import Numbers, leap_of
 from .settings import SpatialSettings
 from .trial import SpatialPlan
 
@@ -193,6 +194,7 @@ def quantities_of(run: SpatialRun) -> dict[str, Json]:
         "tilt_end": (math.acos(min(1.0, max(-1.0, up))), "rad", say("tilt")),
         **_landing(run),
         **_first_entries(run),
+        **_leap(run),
         "sinkage_start": (float(rows["sinkage"][0]), "m", "of the deepest spike when time begins"),
         "sinkage_largest": (float(rows["sinkage"].max()), "m", "of any spike"),
         "largest_spike_force": (float(run.feet[:, 0].max()), "N", say("spike_force")),
@@ -217,6 +219,15 @@ def _first_entries(run: SpatialRun) -> dict[str, tuple[float | None, str, str]]:
         found[f"transition_time_{state}"] = (time, "s", say("first_entry"))
         found[f"transition_angle_{state}"] = (turn, "rad", say("turn_there"))
     return found
+
+
+def _leap(run: SpatialRun) -> Numbers:
+    """Launch, distance and height of its longest hop, as a parabola."""
+    rows, trial = run.columns, run.trial
+    gravity = float(np.linalg.norm(trial.weight)) / (trial.platform.mass + trial.counterweight)
+    velocity = np.column_stack([rows[name] for name in ("vx", "vy", "vz")])
+    lasting = max(1, round(APART / run.master.macro_step))
+    return leap_of(rows["touching"], velocity, gravity=gravity, lasting=lasting)
 
 
 def _landing(run: SpatialRun) -> dict[str, tuple[float | None, str, str]]:

@@ -44,6 +44,10 @@ class SpatialSettings(GrainsSettings):
     """Coefficient of sliding friction [1]; if not given, half of a given mu_s, else that of the surface (brick:
     0.25)."""
 
+    settle_gravity: Positive | None = None
+    """Bed, without a rig: gravity in which it is prepared, lowered to `gravity` before the platform is set down, to
+    save time [m/s2]; `gravity` if not given."""
+
     # The platform, and what carries part of it
     platform: str = Field(
         "hedgehog", description="Platform: hedgehog, cubli, mascot, minerva, cube, or a TOML file (docs/platform.md)."
@@ -132,8 +136,18 @@ class SpatialSettings(GrainsSettings):
         if fault := self.stepping_fault():
             return fault
         if self.on_grains:
-            return self.sleep_fault()
+            return self.sleep_fault() or self._settled_under()
+        if self.settle_gravity is not None:
+            return say("of_a_bed", name="settle_gravity", value=self.settle_gravity)
         for name, field in GrainsSettings.model_fields.items():
             if name not in ON_ANY_GROUND and getattr(self, name) != field.default:
                 return say("of_a_bed", name=name, value=getattr(self, name))
         return None
+
+    def _settled_under(self) -> str | None:
+        """Message if another gravity for the bed is not possible; else None."""
+        if self.settle_gravity is None:
+            return None
+        if self.gravity is None:
+            return say("settle_in_rig", s=self)
+        return say("settle_below", s=self) if self.settle_gravity < self.gravity else None

@@ -3,6 +3,8 @@
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
+import numpy as np
+
 from coupling import SpatialRun
 from experiments.platform.law_spread import (
     Answer,
@@ -13,7 +15,7 @@ from experiments.platform.law_spread import (
     uncertain_of,
     with_spread,
 )
-from experiments.platform.settled import Number
+from experiments.platform.settled import Number, of_earth
 from experiments.platform.surfaces import find_surface
 from experiments.runs.types import Json
 
@@ -49,9 +51,13 @@ def add_spread(
         run.run()
         return {name: entry["value"] for name, entry in quantities_of(run).items()}
 
-    seen = Seen(moved)
+    seen, trial = Seen(moved), plan.trial
+    weights = {"mass": trial.platform.mass, "counterweight": trial.counterweight}
+    weight = float(np.linalg.norm(trial.weight))
+    beyond = bool(uncertain and of_earth(plan.numbers, plan.surface, weight=weight, **weights))
     if uncertain:
-        result["quantities"] = with_spread(best, spread_of_surface(uncertain, seen, depends))
+        stds = dict.fromkeys(depends) if beyond else spread_of_surface(uncertain, seen, depends)
+        result["quantities"] = with_spread(best, stds)
     parameters = [one.name for one in uncertain]
     result["law_spread"], sentence = spread_entries(
         result["quantities"],
@@ -60,6 +66,7 @@ def add_spread(
         law="",
         parameters=parameters,
         absent=seen.absent(depends),
+        beyond=beyond,
     )
     result["departures"]["sentences"].append(sentence)
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Literal
 
 from experiments.campaign.files import keep_model
-from experiments.platform.ground_file import naming_gravity, with_kept_ground
+from experiments.platform.ground_file import naming_gravity, range_warnings, with_kept_ground
 from experiments.platform.law_spread import (
     Answer,
     Seen,
@@ -22,6 +22,7 @@ from experiments.platform.law_spread import (
     with_spread,
 )
 from experiments.platform.numbers import PlatformNumbers, keep_platform, platform_numbers, torque_within_limit
+from experiments.platform.settled import of_earth
 from experiments.platform.surfaces import find_surface, surface_names
 from experiments.runs.folder import RunFolder, write_series
 from experiments.runs.progress import Progress
@@ -99,8 +100,9 @@ def _integrate(settings: TumbleSettings, plan: TumblePlan, *, duration: float) -
 
 
 def _add_spread(
-    settings: TumbleSettings, plan: TumblePlan, result: Json, copied: Path | None, platform: PlatformNumbers
-) -> None:
+    settings: TumbleSettings, plan: TumblePlan, result: Json, trajectory: Trajectory, copied: Path | None,
+    platform: PlatformNumbers,
+) -> None:  # fmt: skip
     """Add the standard deviations that follow from those of the law's parameters, and a sentence on them.
 
     With a sweep or the coupling they are not known, since each takes two more trials a parameter.
@@ -125,24 +127,37 @@ def _add_spread(
         if fitted is not None:
             result["quantities"] = with_spread(best, dict.fromkeys(depends))
         return
+    beyond = _beyond(plan, trajectory)
     if fitted is not None:
         parameters = [name for name, _, _ in moved(fitted)]
         seen = Seen(of_file)
-        stds, law = spread_of_law(fitted, seen, depends), "file"
+        stds, law = dict.fromkeys(depends) if beyond else spread_of_law(fitted, seen, depends), "file"
     else:
         uncertain = uncertain_of(plan.numbers, find_surface(surface)) if surface in surface_names() else []
         parameters = [one.name for one in uncertain]
         seen = Seen(of_surface)
         stds, law = (
-            spread_of_surface(uncertain, seen, depends),
+            dict.fromkeys(depends) if beyond else spread_of_surface(uncertain, seen, depends),
             "" if plan.trial.ground is None else settings.ground,
         )
     if fitted is not None or parameters:
         result["quantities"] = with_spread(best, stds)
     result["law_spread"], sentence = spread_entries(
-        result["quantities"], _SPREAD_OF, surface=surface, law=law, parameters=parameters, absent=seen.absent(depends)
-    )
+        result["quantities"], _SPREAD_OF, surface=surface, law=law, parameters=parameters, absent=seen.absent(depends),
+        beyond=beyond and bool(parameters),
+    )  # fmt: skip
     result["departures"]["sentences"].append(sentence)
+
+
+def _beyond(plan: TumblePlan, trajectory: Trajectory) -> bool:
+    """Whether the tumble leaves the range of the law of its ground file, or has K of 1 g under a small gravity."""
+    trial = plan.trial
+    if plan.fitted is not None:
+        return bool(range_warnings(plan.fitted, trajectory, gravity=trial.gravity, diameter=plan.spikes.diameter))
+    if trial.ground is not None or plan.surface not in surface_names():
+        return False
+    weights = {"weight": trial.weight, "mass": trial.mass, "counterweight": trial.counterweight}
+    return bool(of_earth(plan.numbers, plan.surface, **weights))
 
 
 def _of_the_law(quantities: dict[str, Json]) -> dict[str, float | None]:
@@ -169,7 +184,7 @@ def _on_law(settings: TumbleSettings, folder: RunFolder, progress: Progress) -> 
     else:
         trajectory, full = _integrate(settings, plan, duration=settings.duration)
         result = result_of(settings, plan, trajectory, full)
-    _add_spread(settings, plan, result, copied, platform)
+    _add_spread(settings, plan, result, trajectory, copied, platform)
     progress.update(1.0)
     write_series(folder.path / "trajectory.csv", trajectory_columns(trajectory))
     folder.write_series("motion", motion_columns(trajectory))

@@ -11,7 +11,14 @@ from pydantic import Field, model_validator
 from experiments.grains.lammps import ON_GRAINS as GRAINS
 from experiments.grains.lammps import lammps_fault
 from experiments.grains.settings import OF_THE_MASTER, TumbleBedSettings
-from experiments.platform.settings import Assignments, NotNegative, PlatformSettings, Positive
+from experiments.platform.settings import (
+    BRAKE_TIME,
+    Assignments,
+    NotNegative,
+    PlatformSettings,
+    Positive,
+    brake_time_fault,
+)
 from rigid.checks import nearest
 from rigid.ground.laws import GROUNDS
 from rigid.ground_file import is_ground_file
@@ -107,6 +114,7 @@ class TumbleSettings(TumbleBedSettings, TrialSettings):
     """Torque on the platform while a spike is in contact [N m]; 0.22 if not given."""
     actuator: Literal["motor", "brake"] = "motor"
     """Source of the torque: a motor that accelerates the wheel, or a brake that stops it."""
+    brake_time: Positive | None = Field(None, description=BRAKE_TIME)
     wheel_speed_0: NotNegative | None = None
     """Initial speed of the wheel [rad/s]; 0 for a motor if not given; a brake needs one."""
 
@@ -232,6 +240,8 @@ class TumbleSettings(TumbleBedSettings, TrialSettings):
         return say("brake_in_a_row", s=self) if self.tumbles > 1 and self.actuator == "brake" else None
 
     def _actuation(self) -> str | None:
+        if fault := brake_time_fault(self.brake_time, self.torque, self.actuator):
+            return fault
         if self.actuator != "brake" or (self.wheel_speed_0 or 0.0) > 0 or "wheel_speed_0" in self._swept():
             return None
         found = "is not given" if self.wheel_speed_0 is None else f"= {self.wheel_speed_0:g} rad/s"

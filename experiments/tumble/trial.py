@@ -95,9 +95,13 @@ def plan_tumble(
     torque, origin = (platform.max_motor_torque, f"motor of {platform.name}") if weak else (TORQUE, "default")
     if settings.drop_speed is not None:
         torque, origin = 0.0, "a landing"
+    turning = numbers.settle("wheel_speed_0", 0.0, "default")
+    brake_time = numbers.settle_brake_time(settings.actuator, platform)
+    if brake_time is not None:
+        del numbers["brake_time"]  # no number of a trial
+        torque, origin = numbers.value("wheel_inertia") * turning / brake_time, f"wheel stopped in {brake_time:g} s"
     numbers.settle("torque", torque, origin)
     numbers.settle("torque_until", math.inf, "default: as long as the trial")
-    numbers.settle("wheel_speed_0", 0.0, "default")
     values: Json = {name: number.value for name, number in numbers.items()}
     numbers.settle_limits(platform, in_model=model is not None)
     warnings += numbers.check_actuation(settings.actuator, platform)

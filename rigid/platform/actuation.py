@@ -22,6 +22,7 @@ class Flywheel:
     max_speed: float = math.inf  # Largest speed [rad/s]
     motor_torque: float = math.inf  # What the motor can give at most [N m]
     brake_torque: float = math.inf  # What the brake can give at most [N m]
+    brake_time: float | None = None  # What it takes to stop the wheel from any speed [s]; None: it has a torque
     axis: tuple[float, float, float] = (0.0, 1.0, 0.0)
     """Its axis in the body, of length 1; +y turns the platform towards +x."""
 

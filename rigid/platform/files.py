@@ -89,7 +89,21 @@ class _Wheels(_Table):
     max_speed: Positive
     motor_torque: Positive
     brake_torque: Positive | None = None
+    brake_time: Positive | None = None
     axes: Annotated[tuple[Vector, ...], Field(min_length=1, max_length=3)]
+
+    @model_validator(mode="after")
+    def _one_brake(self) -> "_Wheels":
+        if self.brake_torque is not None and self.brake_time is not None:
+            raise ValueError("brake_torque and brake_time are both given: leave one out")
+        return self
+
+    @property
+    def most_braking(self) -> float:
+        """The largest torque of the brake, or of the motor where there is none [N m]."""
+        if self.brake_time is not None:
+            return self.inertia * self.max_speed / self.brake_time
+        return self.motor_torque if self.brake_torque is None else self.brake_torque
 
 
 class _File(_Table):
@@ -201,7 +215,7 @@ def _build(given: _File) -> Platform:
     wheels = tuple(
         Flywheel(
             inertia=w.inertia, max_speed=w.max_speed, motor_torque=w.motor_torque,
-            brake_torque=w.brake_torque if w.brake_torque is not None else w.motor_torque,
+            brake_torque=w.most_braking, brake_time=w.brake_time,
             axis=(float(a[0]), float(a[1]), float(a[2])),
         )
         for a in axes

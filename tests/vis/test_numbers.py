@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from vis.page.law_rows import cell_of
 from vis.page.numbers import (
     beside,
     between,
@@ -123,3 +124,7 @@ def test_numbers_of_one_sentence_have_one_unit_and_an_end_that_is_hardly_below_0
     assert shown == ["\N{MINUS SIGN}0.01 m", "0.06 m", "0.00 m"]
     assert in_one_unit([0.0246], "m", widest=(0.0, 0.0296)) == ["24.6\N{NO-BREAK SPACE}mm"]
     assert between(-7.8e-7, 0.03, "m") == between(0.0, 0.03, "m") != between(-1e-4, 0.03, "m")
+
+
+def test_an_angle_of_rounding_is_nought_degrees():
+    assert [cell_of(math.radians(value), None, "rad") for value in (6.75e-9, 0.012)] == ["0°", "0.012°"]

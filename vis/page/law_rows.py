@@ -15,6 +15,8 @@ from vis.page.sentences import Sentences
 __all__ = ["answer_rows", "cell_of", "law_row"]
 
 say = Sentences(__package__)
+ROUND_OFF = 1e-4
+"""An angle below this is 0 in a table [degrees]: rounding leaves 1e-8 where a slip begins at once."""
 _ABSENT = {"hop": "no_hop", "slip": "no_slip"}
 """End of the name of a number that a moved law does not have -> what the table says of it."""
 
@@ -70,7 +72,8 @@ def cell_of(value: float | None, std: float | None, unit: str) -> str:
     if unit != "rad":
         return quote(value, std, unit, significant=3)
     if not std:
-        return f"{short(math.degrees(value), 3)}°"
+        degrees = math.degrees(value)
+        return f"{short(degrees if abs(degrees) >= ROUND_OFF else 0.0, 3)}°"
     return " ± ".join(f"{part.strip()}°" for part in quote(math.degrees(value), math.degrees(std)).split("±"))
 
 
@@ -82,6 +85,8 @@ def _with_error(result: Mapping[str, Any], name: str, law: bool) -> tuple[str, s
         value, error = split_spread(cell_of(entry["value"], NORMAL * std, entry["unit"]))
         if error:
             return value, error
+    if law and (result.get("law_spread") or {}).get("beyond"):
+        return cell_of(entry["value"], None, entry["unit"]), say("beyond_range")
     if law and name in (result.get("law_spread") or {}).get("absent", ()):
         last = name.split("_")[-1]
         return cell_of(entry["value"], None, entry["unit"]), say(_ABSENT.get(last, "not_there"))

@@ -26,6 +26,9 @@ _BEYOND = 1.25
 def write_hop_report(report: Report) -> Path:
     """Make figures/ and report.html of the folder of a hop, and return the report."""
     result = report.result
+    beside = f" and {result['surface']}" if result["quantities"]["model_launch_speed"]["value"] is not None else ""
+    # Without the speeds, which are in the table: a title has one line.
+    report.about = report.about.partition(", by a wheel")[0] + f", rigid ground{beside}"
     drawn = [_flights(report)] if any((report.folder / "series").glob("flight*.csv")) else []
     if (report.folder / "trajectory.csv").exists():
         drawn.append(_launch(report))

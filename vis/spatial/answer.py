@@ -23,5 +23,9 @@ _ROWS = {
 
 def answer_tiles(result: Mapping[str, Any]) -> list[Tile]:
     """Rows of the table at the top of a report."""
+    rows = _ROWS
+    if result["quantities"].get("hop_distance", {}).get("value") is not None:  # a hop is the answer of one that hops
+        rows = {"hop_distance": ("Distance of the hop", "ballistic, level ground")} | _ROWS
+        del rows["max_angular_velocity"]
     left_over = Tile("Energy error", quantity(result["quantities"]["energy_residual"]), "of all there was")
-    return [*answer_rows(result, _ROWS, quantity), left_over]
+    return [*answer_rows(result, rows, quantity), left_over]

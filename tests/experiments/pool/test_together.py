@@ -58,7 +58,10 @@ def test_without_dask_one_process_computes_unless_more_are_asked_for(monkeypatch
     monkeypatch.setitem(sys.modules, "distributed", None)
     assert Where().processes([600.0] * 9) == 1
     Where(workers=1).check()
-    for where, named in ((Where(workers=2), "workers = 2"), (Where("tcp://nowhere:1"), "tcp://nowhere:1")):
+    for where, named in (
+        (Where(workers=2), "workers = 1 needs nothing more"),
+        (Where("tcp://nowhere:1"), "tcp://nowhere:1"),
+    ):
         with pytest.raises(ValueError, match=named):
             where.check()
 

@@ -127,3 +127,11 @@ def test_the_work_and_the_time_to_go_are_by_the_pace_of_this_machine_once_it_is_
     assert known.seconds_per_second == pytest.approx(known.grain_count() / known.time_step() / 6e6)
     assert all(part in known._work() for part in ("at 6 million", "measured on"))
     assert on_bed(threads=4).pace is None
+
+
+@pytest.mark.parametrize(("width", "warned"), [(0.03, True), (0.06, False)])
+def test_spikes_of_few_grains_under_a_wide_foot_are_warned_of(width, warned):
+    """The foot is 60 mm wide and passes; what of it goes into the ground is 2.5 grains of 12 mm wide."""
+    run = on_bed()
+    run.__dict__["_standing"] = [(width, 1e-3)]
+    assert any("2.5 grains" in warning for warning in run.told.warnings) == warned
