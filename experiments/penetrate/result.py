@@ -114,8 +114,7 @@ def conclude(
         "sure": sure,
         **({} if rest is None else {"rest": rest}),
     }  # fmt: skip
-    if law is not None:
-        result["model"] = {"file": settings.model, "effects": list(law.effects)}
+    result |= {} if law is None else {"model": {"file": settings.model, "effects": list(law.effects)}}
     _compare(settings, result)
     return Result.make("penetrate", **result)
 

@@ -10,7 +10,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median_low
-from typing import Any
+
+from .types import Json
 
 __all__ = ["KEPT", "PaceMeter", "keep_pace", "known_pace", "runtime_name"]
 
@@ -82,7 +83,7 @@ def _busy() -> bool:
         return False
 
 
-def _kept() -> list[dict[str, Any]]:
+def _kept() -> list[Json]:
     """The runs of the file, oldest first; none where there is no such file, or it is damaged."""
     try:
         rows = json.loads(_file().read_text(encoding="utf-8"))["runs"]
