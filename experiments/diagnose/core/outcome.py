@@ -320,11 +320,22 @@ class Diagnosis(Known):
         first, apart = " + ".join(self.effects) if several else self.effects[0], plan.apart
         ways = {-1.0: "on the way back", 0.0: "in the hold", 1.0: "on the way in"}
         way = ways[float(np.sign(apart["speed_m_s"]))]
-        errors = {key: _with_error(apart[f"{key}_N"], apart[f"{key}_std_N"]) for key in ("one", "other")}
+        errors = {key: _with_error(apart, key) for key in ("one", "other")}
         rival, depth_mm = " + ".join(self.ordered(near)), 1e3 * apart["depth_m"]
         beds = say("without_beds" if self.known_scatter is None else "with_beds")
         told = {"first": first, "rival": rival, "depth_mm": depth_mm, "way": way, "beds": beds}
-        return say("confirming", plan=plan, **told, **errors)
+        return say("confirming", plan=plan, **told, **errors) + self._peak_words(first, rival)
+
+    def _peak_words(self, first: str, rival: str) -> str:
+        """The peak force of the planned push by both models, and whether the campaign has read such a force."""
+        apart = dict((self.planned and self.planned.apart) or {})
+        peaks = {key: _with_error(apart, f"{key}_peak") for key in ("one", "other") if f"{key}_peak_N" in apart}
+        if len(peaks) < 2:
+            return ""
+        read = [self.problem.compare(self.best_values, self.forms, trial).get("force") for trial in self.fitted]
+        most = max(float(np.max(force["measured"])) for force in read if force is not None)
+        larger = max(apart["one_peak_N"], apart["other_peak_N"]) > most
+        return say("peak", first=first, rival=rival, most=most, check=say("load_cell") if larger else "", **peaks)
 
     def base_parameters(self, one: Fit) -> dict[str, Estimated]:
         """The base model's shared numbers in one of the fits: name -> value, std (standard error; None where data and
@@ -407,11 +418,13 @@ def _inflations(one: Fit, other: Fit) -> tuple[float, float]:
     return inflation(one), inflation(other)
 
 
-def _with_error(force: float, std: float) -> str:
-    """0.112 ± 0.016 N, half of a 95 % interval; of a force that the model gives exactly, why it has no error."""
+def _with_error(apart: Mapping[str, float], key: str) -> str:
+    """A force of a planned push: 0.112 ± 0.016 N, half of a 95 % interval; of one that the model gives exactly, why it
+    has no error."""
+    force, std, freedom = (apart.get(f"{key}_{name}") for name in ("N", "std_N", "freedom"))
     if not std:
         return say("exact_force", force=foldable(quote(force, None, "N")))
-    return foldable(fitted({"value": force, "std": std, "unit": "N"}))
+    return foldable(fitted({"value": force, "std": std, "freedom": freedom, "unit": "N"}))
 
 
 def _between(one: Fit) -> Array:
