@@ -89,8 +89,8 @@ def law_sentences(diagnosis: Mapping[str, Any]) -> list[str]:
         own = {name: numbers[row["effect"]][name] for name in row["units"] if name in numbers.get(row["effect"], {})}
         listed = ", ".join(f"{name} = {number_words(entry)}" for name, entry in own.items())
         parts.append(f"{row['effect']}: {row['equation']}" + (f", with {listed}" if listed else ""))
-    has_depth = depth is not None and any(_REFERENCE.search(row["equation"]) for row in rows)
-    reference = say("reference", depth_mm=1e3 * depth) if has_depth else ""
+    has_depth = any(_REFERENCE.search(row["equation"]) for row in rows)
+    reference = say("reference", depth_mm=1e3 * depth) if has_depth and depth is not None else ""
     said = [say("law", parts="; ".join(parts), reference=reference)]
     said += unloading_sentences(diagnosis)
     pairs = _correlated(diagnosis.get("errors", {}))
