@@ -67,8 +67,8 @@ def centred(values: Values, trials: Sequence[Prepared], forms: Sequence[Form]) -
 
 
 def in_one_bed(values: Values, trial: str) -> dict[str, float]:
-    """Values for a push that was not made, in the lane of `trial`: none of a trial's own numbers, so that it is in the
-    mean bed, but for those of `OWN` that are in `values` by kind alone."""
+    """Values for a push that was not made, in the lane of `trial`: without trials' own numbers, thus in the mean bed.
+    Those of `OWN` that are in `values` by kind alone are the lane's."""
     own = {f"{kind}[{trial}]": values[kind] for kind in OWN if kind in values}
     return {name: value for name, value in values.items() if not name.endswith("]")} | own
 
