@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-__all__ = ["CONFIDENCE", "NORMAL", "half_of", "half_width", "student"]
+__all__ = ["CONFIDENCE", "NORMAL", "half_of", "half_width", "joint_freedom", "student"]
 
 CONFIDENCE = 0.95
 """Share of cases in which an interval contains the true value, where nothing else is stated."""
@@ -30,6 +30,15 @@ def half_width(std: float | None, count: int) -> float | None:
     standard deviation is None: one value shows no scatter.
     """
     return None if std is None or count < 2 else student(count - 1) * std / math.sqrt(count)
+
+
+def joint_freedom(std: float, part: float, freedom: float) -> float:
+    """Effective degrees of freedom of a standard error, by Welch and Satterthwaite (JCGM 100:2008, G.4.1).
+
+    ``std``: The whole. ``part``: The part that was found from ``freedom`` degrees of freedom, above 0; the rest counts
+    as known.
+    """
+    return freedom * (std / part) ** 4
 
 
 def half_of(entry: Mapping[str, Any]) -> float | None:

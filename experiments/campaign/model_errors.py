@@ -6,7 +6,7 @@ are the random errors of the fit, right if its model is.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -52,10 +52,13 @@ class ModelErrors:
     std: Array  # in the numbers' units, shape [name_count]
     correlation: Array  # shape [name_count, name_count]
     undetermined: tuple[str, ...]  # names of the numbers that the fit leaves open
+    freedom: Mapping[str, float] = field(default_factory=dict)  # of a standard error that rests on few beds, by name
 
     def at(self, size: str) -> "ModelErrors":
         """The same for a spike of one diameter [m] as the file writes it: `stiffness` for `stiffness@0.012`."""
-        return replace(self, names=tuple(name.removesuffix(f"@{size}") for name in self.names))
+        names = tuple(name.removesuffix(f"@{size}") for name in self.names)
+        freedom = {name.removesuffix(f"@{size}"): value for name, value in self.freedom.items()}
+        return replace(self, names=names, freedom=freedom)
 
     def of(self, name: str) -> float | None:
         """Standard error of a number of the model; None where the file has none."""
@@ -90,4 +93,7 @@ def errors_of(path: str, model: PenetrationModel | TumbleModel) -> ModelErrors |
             f"{path}: [notes] {ERRORS_NOTE}: {len(names)} names, {len(std)} std and {correlation.size} correlations: "
             f"one std of 0 or more for each name and a square of correlations were expected"
         )
-    return ModelErrors(names, std, correlation, tuple(str(name) for name in note["undetermined"]))
+    freedom = note.get("freedom", {})  # a file of an older hedgebed has none
+    if not isinstance(freedom, Mapping) or not all(isinstance(n, int | float) and n > 0 for n in freedom.values()):
+        raise ValueError(f"{path}: [notes] {ERRORS_NOTE}: freedom: name = number above 0 was expected")
+    return ModelErrors(names, std, correlation, tuple(str(name) for name in note["undetermined"]), dict(freedom))

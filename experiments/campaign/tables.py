@@ -55,7 +55,8 @@ loading) are those of the pushes. `withdrawal`: whether one of them was withdraw
 bending of a frame was subtracted."""
 ERRORS_NOTE = "fitted_errors"
 """A note of model.toml: `names` of the fitted numbers (``stiffness``, ``effect.parameter``), their standard errors
-`std` and `correlation`, rows in the order of `names`; `undetermined`: names of those without a standard error."""
+`std` and `correlation`, rows in the order of `names`; `undetermined`: names of those without a standard error;
+`freedom`: name -> degrees of freedom of its standard error, of those that rest on the scatter of few beds."""
 SCATTER_NOTE = "fitted_scatter"
 """A note of model.toml of pushes: by what replicates differ beyond the sensors, standard deviations: `bed` relative, of
 K and C, `bed damping` of C and `bed unloading` of the stiffness of the way back; channels and zeros in their unit.

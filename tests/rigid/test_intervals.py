@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm, t
 
-from rigid.intervals import NORMAL, half_of, half_width, student
+from rigid.intervals import NORMAL, half_of, half_width, joint_freedom, student
 
 
 @pytest.mark.parametrize(("freedom", "printed"), [(1, 12.706), (2, 4.303), (4, 2.776), (10, 2.228), (30, 2.042)])
@@ -36,3 +36,9 @@ def test_a_fitted_number_has_a_normal_interval_and_students_where_its_freedom_is
     assert half_of({"std": 2.0}) == pytest.approx(3.92)
     assert half_of({"std": 2.0, "freedom": 2}) == pytest.approx(8.606, abs=1e-3)
     assert half_of({"std": None, "freedom": 2}) is None and half_of({}) is None
+
+
+def test_of_a_standard_error_the_part_of_few_values_decides_the_freedom():
+    """Welch and Satterthwaite with one part known exactly: (a + b)^2 / (b^2 / n) of variances a and b."""
+    assert joint_freedom(2.0, 2.0, 3) == 3.0
+    assert joint_freedom(math.sqrt(1.0 + 1.0), 1.0, 3) == pytest.approx(12.0)

@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, TypedDict
+from typing import Any, NotRequired, TypedDict
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from vis.page.sentences import Sentences
 
 from .deciding import Gap, certain, closes, gap_of, is_misfit_of_form, smallest, unscattered, values_of_all
 from .effect_texts import confirmation
+from .freedom import Freedoms
 from .matters import is_small, little_left, undecided
 from .next_steps import after_unknown
 from .planned_pushes import chosen_push, no_push_words, separates
@@ -56,6 +57,7 @@ class Estimated(TypedDict):
     value: float
     std: float | None  # Standard error; None: not determined
     unit: str
+    freedom: NotRequired[float]  # Degrees of freedom of it, where the scatter of few beds is a part (`Freedoms`)
 
 
 @dataclass(frozen=True)
@@ -318,33 +320,51 @@ class Diagnosis(Known):
         first, apart = " + ".join(self.effects) if several else self.effects[0], plan.apart
         ways = {-1.0: "on the way back", 0.0: "in the hold", 1.0: "on the way in"}
         way = ways[float(np.sign(apart["speed_m_s"]))]
-        errors = {key: _with_error(apart[f"{key}_N"], apart[f"{key}_std_N"]) for key in ("one", "other")}
+        errors = {key: _with_error(apart, key) for key in ("one", "other")}
         rival, depth_mm = " + ".join(self.ordered(near)), 1e3 * apart["depth_m"]
         beds = say("without_beds" if self.known_scatter is None else "with_beds")
         told = {"first": first, "rival": rival, "depth_mm": depth_mm, "way": way, "beds": beds}
-        return say("confirming", plan=plan, **told, **errors)
+        return say("confirming", plan=plan, **told, **errors) + self._peak_words(first, rival)
+
+    def _peak_words(self, first: str, rival: str) -> str:
+        """The peak force of the planned push by both models, and whether the campaign has read such a force."""
+        apart = dict((self.planned and self.planned.apart) or {})
+        peaks = {key: _with_error(apart, f"{key}_peak") for key in ("one", "other") if f"{key}_peak_N" in apart}
+        if len(peaks) < 2:
+            return ""
+        read = [self.problem.compare(self.best_values, self.forms, trial).get("force") for trial in self.fitted]
+        most = max(float(np.max(force["measured"])) for force in read if force is not None)
+        larger = max(apart["one_peak_N"], apart["other_peak_N"]) > most
+        return say("peak", first=first, rival=rival, most=most, check=say("load_cell") if larger else "", **peaks)
 
     def base_parameters(self, one: Fit) -> dict[str, Estimated]:
         """The base model's shared numbers in one of the fits: name -> value, std (standard error; None where data and
         priors do not determine it), unit."""
         covariance, between = one.covariance(inflation=inflation(one)), _between(one)
         places = {p.name: k for k, p in enumerate(one.model.parameters)}
-        ways = np.eye(len(places))
-        return {
-            p.name: {"value": one.values[p.name], "unit": p.unit,
-                     "std": _error(one, covariance, ways[k := places[p.name]], between=float(between[k]))}
-            for p in self.problem.base if p.trial is None and p.name in places
-        }  # fmt: skip
+        ways, freedoms = np.eye(len(places)), self._freedoms(one, covariance)
+        found: dict[str, Estimated] = {}
+        for p in self.problem.base:
+            if p.trial is None and p.name in places:
+                slope = ways[k := places[p.name]]
+                std = _error(one, covariance, slope, between=float(between[k]))
+                found[p.name] = _estimated(one.values[p.name], std, p.unit, freedoms.of(slope, std))
+        return found
+
+    def _freedoms(self, one: Fit, covariance: Array) -> Freedoms:
+        """Of the numbers of one of the fits."""
+        return Freedoms(one, covariance, (self.known_scatter or {}).get("freedom"))
 
     def parameters(self, effect: str) -> dict[str, Estimated]:
         """An effect in diagnosis.json: name -> value, std (None where data and priors do not determine it), unit."""
         found: dict[str, Estimated] = {}
         covariance = self.best.covariance(inflation=inflation(self.best))
+        freedoms = self._freedoms(self.best, covariance)
         for form in (form for form in self.forms if form.effect == effect):
             loose = self.problem.form_std(form)
             for name, (value, unit, slope) in self._reported(form).items():
                 std = _error(self.best, covariance, slope, loose.get(name, 0.0) * value)
-                found[name] = {"value": float(value), "std": std, "unit": unit}
+                found[name] = _estimated(float(value), std, unit, freedoms.of(slope, std))
         return found
 
     def _reported(self, form: Form) -> dict[str, tuple[float, str, Array]]:
@@ -379,7 +399,8 @@ class Diagnosis(Known):
             name: _error(self.best, covariance, slope, own[name], between=between.get(name, 0.0))
             for name, slope in slopes.items()
         }
-        known = [name for name, std in stds.items() if std is not None]
+        known, freedoms = [name for name, std in stds.items() if std is not None], self._freedoms(self.best, covariance)
+        freedom = {name: freedoms.of(slopes[name], stds[name]) for name in known}
         jointly = np.array([slopes[name] for name in known]).reshape(len(known), len(places))
         shared = jointly @ covariance @ jointly.T + np.diag([own[name] ** 2 for name in known])
         size = np.sqrt(np.maximum(np.diag(shared), 1e-300))
@@ -388,6 +409,7 @@ class Diagnosis(Known):
             "std": [float(f"{stds[name]:.6g}") for name in known],
             "correlation": [[float(f"{x:.6g}") for x in row] for row in shared / np.outer(size, size)],
             "undetermined": [name for name, std in stds.items() if std is None],
+            "freedom": {name: float(f"{value:.6g}") for name, value in freedom.items() if value is not None},
         }
 
 
@@ -396,11 +418,13 @@ def _inflations(one: Fit, other: Fit) -> tuple[float, float]:
     return inflation(one), inflation(other)
 
 
-def _with_error(force: float, std: float) -> str:
-    """0.112 ± 0.016 N, half of a 95 % interval; of a force that the model gives exactly, why it has no error."""
+def _with_error(apart: Mapping[str, float], key: str) -> str:
+    """A force of a planned push: 0.112 ± 0.016 N, half of a 95 % interval; of one that the model gives exactly, why it
+    has no error."""
+    force, std, freedom = (apart.get(f"{key}_{name}") for name in ("N", "std_N", "freedom"))
     if not std:
         return say("exact_force", force=foldable(quote(force, None, "N")))
-    return foldable(fitted({"value": force, "std": std, "unit": "N"}))
+    return foldable(fitted({"value": force, "std": std, "freedom": freedom, "unit": "N"}))
 
 
 def _between(one: Fit) -> Array:
@@ -410,6 +434,12 @@ def _between(one: Fit) -> Array:
     if one.model.problem.kind != "penetration" or len(modes) < 2:
         return np.zeros(len(one.model.parameters))
     return np.sqrt(np.maximum(np.diag(one.covariance_by_trial()), 0.0))
+
+
+def _estimated(value: float, std: float | None, unit: str, freedom: float | None) -> Estimated:
+    """A number with its freedom where it has one."""
+    number: Estimated = {"value": value, "std": std, "unit": unit}
+    return number if freedom is None else {**number, "freedom": freedom}
 
 
 def _error(found: Fit, covariance: Array, slope: Array, more: float = 0.0, *, between: float = 0.0) -> float | None:

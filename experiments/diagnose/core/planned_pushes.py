@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from experiments.diagnose.fit.trials import Planned
-from rigid.intervals import NORMAL
+from rigid.intervals import NORMAL, joint_freedom
 from vis.page.sentences import Sentences
 
 __all__ = ["chosen_push", "in_other_beds", "no_push_words", "pushes_needed", "separates"]
@@ -19,12 +19,21 @@ _MOST_PUSHES = 20  # whose mean is proposed where one does not separate two mode
 
 
 def in_other_beds(apart: Mapping[str, float], scatter: Mapping[str, float]) -> dict[str, float]:
-    """`Planned.apart` with what beds differ by, `scatter` by kind: a stiffer bed makes both forces as much larger."""
-    bed, zero = scatter.get("bed", 0.0), scatter.get("force zero", 0.0)
-    wide = {f"{key}_std_N": math.hypot(apart[f"{key}_std_N"], bed * apart[f"{key}_N"]) for key in ("one", "other")}
-    most = max(abs(apart["one_N"]), abs(apart["other_N"]))
+    """`Planned.apart` with what beds differ by: `scatter` by kind, and the `freedom` that it was found from.
+
+    Where the search did not find what other beds do, a stiffer bed makes both forces as much larger."""
+    bed, wander, zero = (scatter.get(kind, 0.0) for kind in ("bed", "force", "force zero"))
+    wide, most = {}, 0.0
+    for key in ("one", "other", "one_peak", "other_peak"):
+        if f"{key}_N" not in apart:  # a plan without peaks
+            continue
+        beds = math.hypot(apart.get(f"{key}_beds_N") or bed * apart[f"{key}_N"], wander)
+        wide[f"{key}_std_N"] = std = math.hypot(apart[f"{key}_std_N"], beds)
+        if beds > 0 and scatter.get("freedom"):
+            wide[f"{key}_freedom"] = joint_freedom(std, beds, scatter["freedom"])
+        most = max(most, beds) if "peak" not in key else most
     return {**apart, **wide, "model_std_N": math.hypot(apart["one_std_N"], apart["other_std_N"]),
-            "scatter_N": math.hypot(apart.get("noise_N", 0.0), bed * most, zero)}  # fmt: skip
+            "scatter_N": math.hypot(apart.get("noise_N", 0.0), most, zero)}  # fmt: skip
 
 
 def chosen_push(plan: Planned, scatter: Mapping[str, float]) -> Planned:

@@ -1,4 +1,4 @@
 """Fits of a model to trials: least squares, likelihoods, evidence, the gate against false alarms.
 
-Imports `experiments.check`, `experiments.runs`, `rigid`.
+Imports `experiments.check`, `experiments.runs`, `rigid`, `vis`.
 """

@@ -8,7 +8,10 @@ import math
 import re
 from dataclasses import dataclass
 
+from vis.page.numbers import foldable, quote
+
 from .fitting import Fit
+from .problem import Parameter
 
 __all__ = ["Bound", "bends_little_away", "bounds_met", "is_strained", "strained_parameters"]
 
@@ -30,6 +33,7 @@ class Bound:
     at_bound: bool
     stated: float | None = None  # the value in campaign.toml, where there is one
     stated_std: float | None = None
+    side: str = ""  # ``least`` or ``most``: which end of its range an effect's parameter met
 
     @property
     def strains(self) -> bool:
@@ -39,11 +43,13 @@ class Bound:
     @property
     def words(self) -> str:
         """As in: the mass went to ..."""
-        value = f"{self.parameter} {self.value:.4g}" + (f" {self.unit}" if self.unit != "1" else "")
         if self.sigmas is not None:
+            value = f"{self.parameter} {self.value:.4g}" + (f" {self.unit}" if self.unit != "1" else "")
             end = ", the end of its range" if self.at_bound else ""
             return f"{value} ({self.sigmas:+.1f} sigma{end})"
-        return f"{value} (the most or least that the library allows)"
+        value = f"{self.parameter} {foldable(quote(self.value, None, self.unit))}"
+        may = {"least": "less", "most": "more"}[self.side]
+        return f"{value} (the {self.side} that the library allows: it may be {may})"
 
 
 def is_strained(found: Fit) -> bool:
@@ -88,5 +94,18 @@ def bounds_met(found: Fit) -> tuple[Bound, ...]:
             if abs(sigmas) >= _FAR:
                 shown.append(Bound(p.name, value, p.unit, sigmas, at, p.value, p.std))
         elif p.name not in base and "." in p.name and at and abs(value) > near:
-            shown.append(Bound(p.name, value, p.unit, None, True))
+            shown.append(_of_effect(found, p))
     return tuple(shown)
+
+
+def _of_effect(found: Fit, p: Parameter) -> Bound:
+    """An effect's parameter at its bound, as it is reported: it may be fitted as a logarithm or a share."""
+    form = next((form for form in found.model.forms if any(p.name == own.name for own in form.parameters)), None)
+    ends = [p.value if math.isfinite(p.value) else 0.0, found.values[p.name]]
+    name, unit = p.name, p.unit
+    if form is not None and p.name in form.slots:
+        number = form.slots[p.name].name.rpartition(".")[2]
+        told = [found.model.problem.reported({**found.values, p.name: end}, form) for end in ends]
+        if number in told[1]:
+            name, unit, ends = f"{form.effect}.{number}", told[1][number][1], [one[number][0] for one in told]
+    return Bound(name, ends[1], unit, None, True, side="least" if ends[1] < ends[0] else "most")

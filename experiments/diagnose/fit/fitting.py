@@ -11,7 +11,7 @@ the batched model.
 from __future__ import annotations
 
 import math
-from collections.abc import Generator, Sequence
+from collections.abc import Collection, Generator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple, TypeVar
@@ -119,13 +119,16 @@ class Fit:
         """Of half the objective, in units of the parameters' scales, shape [p, p]."""
         return self.slopes.T @ self.slopes + np.diag(self.prior_precision())
 
-    def covariance(self, *, inflation: float = 1.0) -> Array:
+    def covariance(self, *, inflation: float = 1.0, known: Collection[str] = ()) -> Array:
         """Of the values, in their units, shape [p, p]; bounds are not seen, singular directions get wide.
 
-        `inflation`: by how much the data are noisier than stated; the priors are not.
+        `inflation`: by how much the data are noisier than stated; the priors are not. `known`: names of parameters that
+        are taken for known, 0 in the result.
         """
         scales = np.array([p.scale for p in self.model.parameters])
         hessian = self.slopes.T @ self.slopes / inflation**2 + np.diag(self.prior_precision())
+        held = np.array([p.name in known for p in self.model.parameters], dtype=bool)
+        hessian[held], hessian[:, held] = 0.0, 0.0
         size = np.sqrt(np.maximum(np.diag(hessian), 1e-300))
         inverse = np.linalg.pinv(hessian / np.outer(size, size), rcond=1e-12, hermitian=True)
         return inverse / np.outer(size, size) * np.outer(scales, scales)

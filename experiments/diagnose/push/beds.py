@@ -11,7 +11,7 @@ from .data import Prepared, stds
 from .forms import Scales
 from .parameters import comes_back, diameters_of, named
 
-__all__ = ["OWN", "centred", "own_numbers", "scatter_parameters"]
+__all__ = ["OWN", "centred", "in_one_bed", "own_numbers", "scatter_parameters"]
 
 OWN = ("bed", "bed damping", "bed unloading", "depth zero")  # numbers of a push alone that its force follows from
 
@@ -64,6 +64,13 @@ def centred(values: Values, trials: Sequence[Prepared], forms: Sequence[Form]) -
             found[shared] = (found[shared] + more) * (1 + mean) - more
             found |= {name: (1 + values[name]) / (1 + mean) - 1 for name in own}
     return found
+
+
+def in_one_bed(values: Values, trial: str) -> dict[str, float]:
+    """Values for a push that was not made, in the lane of `trial`: without trials' own numbers, thus in the mean bed.
+    Those of `OWN` that are in `values` by kind alone are the lane's."""
+    own = {f"{kind}[{trial}]": values[kind] for kind in OWN if kind in values}
+    return {name: value for name, value in values.items() if not name.endswith("]")} | own
 
 
 def own_numbers(points: Sequence[Values], kind: str, trials: Sequence[Prepared], given: Container[str]) -> Array:

@@ -22,6 +22,7 @@ Predict = Callable[[Sequence[tuple[Values, Sequence[Form]]], float, Array, Array
 
 _SPEEDS, _DEPTHS, _HOLDS = (0.3, 1.0, 3.0), (0.5, 1.0, 2.0), (0.0, 30.0)
 """Times the slowest and the fastest speed and the deepest depth of the campaign; seconds."""
+_BEDS = ("bed", "bed damping", "bed unloading")  # in which a bed that is prepared anew differs from the mean one
 _ROWS = 200  # of a planned push
 _KNOWN = 0.1
 """Share of the push's depth above which no reading is quoted: there the zero of the depth and the first contact, which
@@ -51,10 +52,11 @@ def best_push(
     for diameter, speed, part, hold, returns in itertools.product(diameters, paces, _DEPTHS, _HOLDS, (False, True)):
         time, z, v = _path(speed, part * depth, hold, returns)
         d, noise = np.zeros(len(time)), np.eye(len(time))
-        forces: list[tuple[Array, Array]] = []
+        forces: list[tuple[Array, Array, Array]] = []
         for sign, fit, factor in ((1.0, one, inflation[0]), (-1.0, other, inflation[1])):
             force, errors = _predicted(fit, predict, factor, diameter, time, z, v)
-            forces.append((force, np.linalg.norm(errors, axis=1)))
+            beds = _of_beds(fit, predict, diameter, time, z, v)
+            forces.append((force, np.linalg.norm(errors, axis=1), beds))
             weight = np.sqrt(rows / _ROWS) / std
             d += sign * weight * force
             noise += weight**2 * (errors @ errors.T)
@@ -67,14 +69,18 @@ def best_push(
     return replace(max(found, key=lambda push: push.nats), compared=tuple(found))
 
 
-def _apart(z: Array, v: Array, forces: Sequence[tuple[Array, Array]], std: float) -> dict[str, float]:
-    """The reading at which two predictions, each a force with its standard error [N], differ most over their errors,
-    below the depth at which its zero decides."""
-    (one, one_std), (other, other_std) = forces
+def _apart(z: Array, v: Array, forces: Sequence[tuple[Array, Array, Array]], std: float) -> dict[str, float]:
+    """The reading at which two predictions, each a force with its standard error and its scatter in other beds [N],
+    differ most over their errors, below the depth at which its zero decides; and the peak force of each."""
+    (one, one_std, _), (other, other_std, _) = forces
     apart = np.abs(one - other) / np.sqrt(one_std**2 + other_std**2 + std**2)
     at = int(np.argmax(np.where(z >= _KNOWN * z.max(), apart, -1.0)))
-    return {"depth_m": float(z[at]), "speed_m_s": float(v[at]), "one_N": float(one[at]), "other_N": float(other[at]),
-            "one_std_N": float(one_std[at]), "other_std_N": float(other_std[at]), "noise_N": std}  # fmt: skip
+    found = {"depth_m": float(z[at]), "speed_m_s": float(v[at]), "noise_N": std}
+    for key, columns in zip(("one", "other"), forces, strict=True):
+        for name, row in ((key, at), (f"{key}_peak", int(np.argmax(columns[0])))):
+            force, fit_std, beds = (float(column[row]) for column in columns)
+            found |= {f"{name}_N": force, f"{name}_std_N": fit_std, f"{name}_beds_N": beds}
+    return found
 
 
 def _words(push: Mapping[str, float], says_diameter: bool) -> str:
@@ -99,6 +105,17 @@ def _path(speed: float, depth: float, hold: float, returns: bool) -> tuple[Array
         [a + (b - a) * np.arange(1, n + 1) / n for a, b, n in zip(ends, ends[1:], counts, strict=False)]
     )
     return time, np.interp(time, ends, np.cumsum([0.0, *(spans * paces)])), np.repeat(paces, counts)
+
+
+def _of_beds(fit: Estimate, predict: Predict, diameter: float, time: Array, z: Array, v: Array) -> Array:
+    """Standard deviation of a force in another bed than the mean one, shape [n]; by beds one standard deviation of the
+    fit's scatter stiffer and softer, and so on."""
+    stds = {p.kind: p.std for p in fit.model.scatter if p.kind in _BEDS}
+    points = [({**fit.values, kind: sign * std}, fit.model.forms) for kind, std in stds.items() for sign in (1.0, -1.0)]
+    if not points:
+        return np.zeros(len(time))
+    forces = predict(points, diameter, time, z, v)
+    return np.linalg.norm(0.5 * (forces[0::2] - forces[1::2]), axis=0)
 
 
 def _predicted(

@@ -24,7 +24,7 @@ from experiments.diagnose.fit.problem import Array, Estimate, Finding, Form, Pro
 from experiments.diagnose.fit.trials import Planned, Samples, TrialInfo
 from experiments.diagnose.noise.jitter import Shaken
 
-from .beds import OWN, centred, own_numbers, scatter_parameters
+from .beds import OWN, centred, in_one_bed, own_numbers, scatter_parameters
 from .data import Prepared, of_drop, prepare, stds, tip_depth
 from .depth import SmoothDepth
 from .design import best_push
@@ -489,7 +489,7 @@ class PenetrationProblem(Problem):
             none = np.zeros((len(time), 0))
             like = next(trial for trial in driven if trial.diameter == diameter)
             like = replace(like, time=time, smooth=SmoothDepth(z, v, none, none))
-            return self._run_each([([values], forms) for values, forms in points], [like])[0]
+            return self._run_each([([in_one_bed(values, like.info.id)], forms) for values, forms in points], [like])[0]
 
         return best_push(
             one, other, predict, inflation=inflation, diameters=sorted({trial.diameter for trial in driven}),

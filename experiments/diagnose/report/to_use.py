@@ -1,6 +1,7 @@
 """Which K and C of pushes and drops to use, in which law, and what their errors leave out."""
 
 import math
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -15,9 +16,10 @@ from .sentences import say
 __all__ = ["SERIES", "law_sentences", "near_model_sentences", "neutral_sentences", "number_words", "peak_sentences",
            "unloading_sentences", "use_sentences"]  # fmt: skip
 
-SERIES = {"count": 77, "middle": 0.3, "most": 3.3}
+SERIES = {"count": 84, "middle": 0.3, "most": 3.3}
 """By how much K of campaigns without an effect was below the ground's [%]: docs/results/diagnose-second, pushes."""
 _STRONG, _PAIRS = 0.9, 3  # correlation from which on it is reported, and of how many pairs
+_REFERENCE = re.compile(r"\bD\b")  # the typical depth in an equation
 _SHOWN = 4  # diameters whose K is in the sentence; of more it is in the table
 
 
@@ -87,7 +89,8 @@ def law_sentences(diagnosis: Mapping[str, Any]) -> list[str]:
         own = {name: numbers[row["effect"]][name] for name in row["units"] if name in numbers.get(row["effect"], {})}
         listed = ", ".join(f"{name} = {number_words(entry)}" for name, entry in own.items())
         parts.append(f"{row['effect']}: {row['equation']}" + (f", with {listed}" if listed else ""))
-    reference = "" if depth is None else say("reference", depth_mm=1e3 * depth)
+    has_depth = any(_REFERENCE.search(row["equation"]) for row in rows)
+    reference = say("reference", depth_mm=1e3 * depth) if has_depth and depth is not None else ""
     said = [say("law", parts="; ".join(parts), reference=reference)]
     said += unloading_sentences(diagnosis)
     pairs = _correlated(diagnosis.get("errors", {}))
@@ -129,6 +132,11 @@ def unloading_sentences(diagnosis: Mapping[str, Any]) -> list[str]:
     correlation = errors["correlation"][places[0]][places[1]]
     std = math.sqrt(max(slopes[0] ** 2 + slopes[1] ** 2 + 2 * correlation * slopes[0] * slopes[1], 0.0))
     stiffness = {"value": base["value"] * (1 + u["value"]), "std": std, "unit": "N/m"}
+    # Both rest on the scatter of the same beds, and each on it by the root of their freedom over its own.
+    shares = [slope**2 / math.sqrt(entry["freedom"]) for slope, entry in zip(slopes, (base, u), strict=True)
+              if "freedom" in entry]  # fmt: skip
+    if shares:
+        stiffness["freedom"] = (sum(slope**2 for slope in slopes) / sum(shares)) ** 2
     return [say("unloading", stiffness=number_words(stiffness))]
 
 

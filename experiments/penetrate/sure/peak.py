@@ -14,6 +14,7 @@ from experiments.diagnose.fit.forms import OwnEffect
 from experiments.diagnose.push.law import push
 from experiments.diagnose.push.slots import SLOTS, slot_places
 from experiments.runs.types import Json
+from rigid.intervals import joint_freedom
 from vis.page.sentences import Sentences
 
 __all__ = ["Law", "PeakError", "peak_error", "peak_of", "returned_std", "with_fit_errors"]
@@ -70,7 +71,7 @@ class PeakError:
         found = self.of.get("freedom")
         if self.fit is None or not self.scatter or not found:
             return None
-        return float(found) * (1.0 + (self.fit / self.scatter) ** 2) ** 2
+        return joint_freedom(math.hypot(self.fit, self.scatter), self.scatter, float(found))
 
     @property
     def words(self) -> str:
@@ -183,6 +184,8 @@ def with_fit_errors(
     for name in ("stiffness", "damping"):
         if (std := errors.of(name)) is not None:
             found[name] = {**found[name], "std": std, "note": f"{found[name]['note']}; {say('fit_error')}"}
+            if name in errors.freedom:
+                found[name]["freedom"] = errors.freedom[name]
     open_ones = ", ".join(errors.undetermined)
     for name, error in peaks.items():
         words = say("no_fit_error", names=open_ones)

@@ -10,12 +10,14 @@ from golden import golden
 
 from dem.grains.materials import Material
 from experiments.campaign import read_campaign
+from experiments.campaign.model_errors import ModelErrors
 from experiments.campaign.tables import BASE_NOTE, ERRORS_NOTE, OTHERS_NOTE, PEAKS_NOTE, RANGE_NOTE, SCATTER_NOTE
 from experiments.cli.main import main
 from experiments.penetrate import beds
 from experiments.penetrate import experiment as penetrate
 from experiments.penetrate.amended import AmendedGround, read_law
 from experiments.penetrate.settings import PenetrateSettings
+from experiments.penetrate.sure.peak import with_fit_errors
 from experiments.penetrate.units import make_run, plan_units
 from rigid.intervals import student
 from vis.page.folder import read_folder
@@ -321,10 +323,19 @@ def test_a_model_without_a_ground_is_refused_with_what_to_add(tmp_path, capsys):
     assert "--ground spring-damper" in said and "--ground bed" in said and not (tmp_path / "run").exists()
 
 
-@pytest.mark.parametrize("wrong", ["std = [1.0]", "correlation = [[1.0, 0.0]]", 'std = ["a", "b"]', "names = 3"])
+def test_k_has_the_freedom_that_its_file_notes():
+    errors = ModelErrors(("stiffness@0.012", "damping"), np.ones(2), np.eye(2), (), {"stiffness@0.012": 2.1})
+    numbers = {name: {"value": 1.0, "std": None, "unit": "1", "note": "of the model"}
+               for name in ("stiffness", "damping")}  # fmt: skip
+    found = with_fit_errors(numbers, errors.at("0.012"), {})
+    assert found["stiffness"]["freedom"] == 2.1 and "freedom" not in found["damping"]
+
+
+@pytest.mark.parametrize("wrong", ["std = [1.0]", "correlation = [[1.0, 0.0]]", 'std = ["a", "b"]', "names = 3",
+                                   "freedom = {stiffness = 0}"])  # fmt: skip
 def test_errors_of_a_model_that_do_not_belong_together_are_refused_by_name(law, wrong):
     right = {"names": '["stiffness", "damping"]', "std": "[1.0, 0.1]", "correlation": "[[1, 0], [0, 1]]",
-             "undetermined": "[]"}  # fmt: skip
+             "undetermined": "[]", "freedom": "{stiffness = 2}"}  # fmt: skip
     name, _, value = wrong.partition(" = ")
     lines = [f"{key} = {value if key == name else own}\n" for key, own in right.items()]
     with pytest.raises(ValueError, match=rf"model\.toml.*{ERRORS_NOTE}"):

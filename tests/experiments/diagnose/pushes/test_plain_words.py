@@ -84,6 +84,11 @@ def test_the_stiffness_of_unloading_is_stated_in_n_m_with_the_error_of_both_numb
     }
     (said,) = unloading_sentences(diagnosis)
     assert number_words({"value": 1000.0, "std": error, "unit": "N/m"}) in said
+    diagnosis["base"]["after"]["stiffness"]["freedom"] = unload["freedom"] = 2.0  # both by the scatter of the same beds
+    assert (
+        number_words({"value": 1000.0, "std": error, "unit": "N/m", "freedom": 2.0})
+        in unloading_sentences(diagnosis)[0]
+    )
     diagnosis["errors"]["names"] = ["stiffness@0.012", names[1]]
     assert unloading_sentences(diagnosis) == []
 

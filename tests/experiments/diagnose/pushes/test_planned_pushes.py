@@ -1,5 +1,9 @@
 """A planned push that separates two models by less than beds differ is not called best; what separates them is said."""
 
+import math
+from types import SimpleNamespace
+
+import numpy as np
 import pytest
 from golden import golden
 
@@ -10,7 +14,10 @@ from experiments.diagnose.core.planned_pushes import (
     pushes_needed,
     separates,
 )
+from experiments.diagnose.fit.problem import Parameter
 from experiments.diagnose.fit.trials import Planned
+from experiments.diagnose.push.beds import in_one_bed
+from experiments.diagnose.push.design import _of_beds
 
 APART = {"depth_m": 0.024, "speed_m_s": 0.05, "one_N": 40.0, "other_N": 39.0, "one_std_N": 0.1, "other_std_N": 0.1,
          "noise_N": 0.05}  # fmt: skip
@@ -45,3 +52,33 @@ def test_of_all_pushes_one_that_separates_beside_the_beds_is_taken_before_a_like
     plan = Planned({}, "a", 9.0, 2, APART, (likely, clear))
     assert chosen_push(plan, {"bed": 0.03}).what == "b" and chosen_push(plan, {}).what == "a"
     assert chosen_push(plan, {"bed": 0.5}).what == "a"
+
+
+def test_the_error_of_a_planned_push_has_its_own_scatter_and_its_freedom():
+    """Other beds differ there by more than their share of the force: on a stiff way back it is a small difference."""
+    found = {"one_beds_N": 0.8, "one_peak_N": 68.0, "one_peak_std_N": 0.6, "one_peak_beds_N": 0.8}
+    wide = in_other_beds(APART | found, {"bed": 0.03, "force": 0.6, "freedom": 2})
+    assert wide["one_std_N"] == pytest.approx(math.hypot(0.1, 1.0)) and wide["other_std_N"] > 1.17
+    assert wide["one_peak_std_N"] == pytest.approx(math.hypot(0.6, 1.0))
+    assert wide["one_peak_freedom"] == pytest.approx(2 * (1 + 0.36) ** 2)
+    assert "one_freedom" not in in_other_beds(APART | found, {"bed": 0.03})
+
+
+def test_a_planned_push_is_in_the_mean_bed_or_in_one_that_is_stated():
+    values = {"stiffness": 900.0, "bed[n1]": 0.1, "force zero[n2]": 0.3}
+    assert in_one_bed(values, "n1") == {"stiffness": 900.0}
+    assert in_one_bed(values | {"bed": 0.02}, "n1")["bed[n1]"] == 0.02
+
+
+def test_the_scatter_of_a_planned_push_is_half_of_what_stiffer_and_softer_beds_differ_by():
+    """F = K (1 + b) z, and a damper of its own factor: root of (K z s_b)^2 + (C v s_c)^2."""
+    scatter = [Parameter(name=f"{kind}[n1]", kind=kind, unit="1", value=0.0, std=std, scale=0.02)
+               for kind, std in (("bed", 0.02), ("bed damping", 0.1), ("force zero", 3.0))]  # fmt: skip
+    fit = SimpleNamespace(values={}, model=SimpleNamespace(scatter=scatter, forms=()))
+    z, v = np.array([0.01, 0.02]), np.array([0.1, 0.1])
+
+    def predict(points, diameter, time, z, v):
+        return np.array([1000.0 * (1 + own.get("bed", 0.0)) * z + 50.0 * (1 + own.get("bed damping", 0.0)) * v
+                         for own, _ in points])  # fmt: skip
+
+    assert _of_beds(fit, predict, 0.02, z, z, v) == pytest.approx(np.hypot(1000.0 * z * 0.02, 50.0 * v * 0.1))
