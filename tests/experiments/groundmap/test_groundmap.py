@@ -224,8 +224,15 @@ def test_the_terminal_has_two_digits_of_each_number_millimetres_and_says_that_th
 
 def test_the_report_of_a_tumble_on_a_file_has_the_95_percent_error_of_its_angle_and_of_every_number(tmp_path, capsys):
     assert main(["ground", "--out", str(tmp_path / "run"), "--quiet"]) == DONE
-    tumble = ["tumble", "--ground", str(tmp_path / "run" / "ground.toml"), "--duration", "1", "--rig", "0.0085"]
-    assert main([*tumble, "--out", str(tmp_path / "tumble"), "--quiet"]) == DONE
+    ground = tmp_path / "run" / "ground.toml"
+    tumble = ["tumble", "--duration", "1", "--rig", "0.0085", "--quiet", "--out", str(tmp_path / "beyond"), "--ground"]
+    assert main([*tumble, str(ground)]) == DONE
+    assert re.search(r"Trajectory angle .* beyond range", capsys.readouterr().out)
+    text = re.sub(r"^load = .*$", "load = [0.0, 1.0]", ground.read_text(encoding="utf-8"), flags=re.MULTILINE)
+    wider = tmp_path / "wider.toml"
+    wider.write_text(re.sub(r"^depth = .*$", "depth = [0.0, 0.03]", text, flags=re.MULTILINE), encoding="utf-8")
+    tumble[tumble.index(str(tmp_path / "beyond"))] = str(tmp_path / "tumble")
+    assert main([*tumble, str(wider)]) == DONE
     angle = json.loads((tmp_path / "tumble" / "result.json").read_text(encoding="utf-8"))["quantities"]
     value, std = (math.degrees(angle["trajectory_angle"][key]) for key in ("value", "std"))
     half = NORMAL * std
