@@ -227,7 +227,7 @@ def test_the_report_of_a_tumble_on_a_file_has_the_95_percent_error_of_its_angle_
     ground = tmp_path / "run" / "ground.toml"
     tumble = ["tumble", "--duration", "1", "--rig", "0.0085", "--quiet", "--out", str(tmp_path / "beyond"), "--ground"]
     assert main([*tumble, str(ground)]) == DONE
-    assert re.search(r"Trajectory angle .* beyond range", capsys.readouterr().out)
+    assert "beyond range" in capsys.readouterr().out
     text = re.sub(r"^load = .*$", "load = [0.0, 1.0]", ground.read_text(encoding="utf-8"), flags=re.MULTILINE)
     wider = tmp_path / "wider.toml"
     wider.write_text(re.sub(r"^depth = .*$", "depth = [0.0, 0.03]", text, flags=re.MULTILINE), encoding="utf-8")
