@@ -8,7 +8,7 @@ import numpy as np
 
 from dem.engine.values import Grains
 
-__all__ = ["FakeBed"]
+__all__ = ["FakeBed", "lay_closed_form"]
 
 
 class FakeBed:
@@ -91,3 +91,14 @@ class FakeBed:
     def restore(self, state):
         self._pose, self._rate = np.array(state["pose"]), np.array(state["rate"])
         self._deepest, self._force, self.time = (float(value) for value in state["memory"])
+
+
+def lay_closed_form(monkeypatch, beds, material):
+    """Have `experiments.penetrate.beds` lay beds of this material with K = 100 + 10 seed N/m and C = 0.5 N s/m."""
+
+    def prepare(settings, seed, young, progress):
+        return FakeBed(size=settings.bed_size, seed=seed, hardness=100.0 + 10.0 * seed, rate=0.5, unload=4000.0)
+
+    monkeypatch.setattr(beds, "prepare_bed", prepare)
+    monkeypatch.setattr(beds, "find_material", lambda name: material)
+    monkeypatch.setattr(beds, "bed_step", lambda settings, young: 2e-5)

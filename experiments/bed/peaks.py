@@ -4,8 +4,7 @@ A curve that only fluctuates has some thirty windows. The largest lies 2 standar
 one sample of twenty 3: so does the maximum of thirty normal numbers. `LEAST_PEAK` is the latter.
 """
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,8 +26,8 @@ def peak_over_noise(smooth: NDArray[np.float64]) -> float:
     return above / spread if spread > 0 else np.inf
 
 
-def without_peak(tests: Sequence[Mapping[str, Any]]) -> float | None:
-    """The mean `peak_over_noise` of tests where it is below `LEAST_PEAK`, else None; None too where it is not kept."""
-    known = [test["peak_over_noise"] for test in tests if test.get("peak_over_noise") is not None]
+def without_peak(peaks: Iterable[float | None]) -> float | None:
+    """The mean of these `peak_over_noise` where it is below `LEAST_PEAK`, else None; None too where none is known."""
+    known = [over for over in peaks if over is not None]
     mean = float(np.mean(known)) if known else LEAST_PEAK
     return mean if mean < LEAST_PEAK else None

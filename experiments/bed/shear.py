@@ -164,7 +164,7 @@ def _result(settings: BedShearSettings, runs: list[Shearing], grain: float, reci
     if len(runs) < 3:
         warnings.append("fewer than three pressures: the line through them has no error that could be stated")
     quantities = _strengths(strengths, _BAND * grain / bed.surface, runs[0])
-    if (over := without_peak([{"peak_over_noise": one.peak_over_noise} for one in strengths])) is not None:
+    if (over := without_peak(one.peak_over_noise for one in strengths)) is not None:
         peak, late = (math.degrees(math.atan(quantities[f"{kind}_ratio"]["value"])) for kind in ("peak", "critical"))
         warnings.append(say("no_peak", over=over, least=LEAST_PEAK, excess=peak - late))
     if doubt := caveat(bed.material):

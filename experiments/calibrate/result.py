@@ -142,7 +142,7 @@ def _no_peak(target: Target, found: Measured, done: Simulated, best: Values) -> 
         return {}
     checks = [test for test in done.tests if test["test"].startswith("check") and test["values"] == best]
     own = [test for test in checks if test["state"] == target.state]
-    if (over := without_peak(own)) is None:
+    if (over := without_peak(test.get("peak_over_noise") for test in own)) is None:
         return {}
     figure = "cohesion" if "cohesion" in target.figure else "critical_friction_angle"
     late = replace(target, figure=figure)

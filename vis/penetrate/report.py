@@ -20,7 +20,7 @@ from rigid.intervals import half_of
 from vis.page.answer import answer
 from vis.page.folder import Run, RunFolder, Series, from_python, read_folder
 from vis.page.limits import limits_words
-from vis.page.numbers import quote
+from vis.page.numbers import fitted, quote
 from vis.page.page import Block, Section, Tile, figure, table, text, write_template
 from vis.page.plots import AMENDED, BED, DASHED, GREY, MODEL, handle, legend_above, sheet, styled, title_above
 from vis.page.report import Progress, Report, again, report_of, title_of
@@ -237,10 +237,7 @@ def _write_law_report(report: Report) -> Path:
     of_file = "ground_file" in report.result
     key = "law" if of_file else "amended"
     blocks = [text("There is nothing to draw.")] if drawing is None else [report.draw(key, drawing, shown=_shown(run))]
-    rows = [
-        (name.replace("_", " "), quote(entry["value"], half_of(entry), entry["unit"]), str(entry.get("note", "")))
-        for name, entry in numbers.items()
-    ]
+    rows = [(name.replace("_", " "), fitted(entry), str(entry.get("note", ""))) for name, entry in numbers.items()]
     head = say("value_in_95")
     meant = [] if of_file else [text(error_words(report.result), small=True)]
     whose = f"no bed: the law of {'a ground file' if of_file else 'the model'} only"

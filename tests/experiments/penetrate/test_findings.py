@@ -1,7 +1,7 @@
 """What is said of a run: forces above depth 0, which stiffness holds when, one bed, fits that cannot tell K from C."""
 
 import pytest
-from fake_bed import FakeBed
+from fake_bed import FakeBed, lay_closed_form
 from golden import golden
 
 from dem.grains.materials import Material
@@ -20,15 +20,8 @@ QUICK = {
 
 @pytest.fixture(autouse=True)
 def fake(monkeypatch):
-    """Beds in closed form: K = 100 + 10 seed N/m, C = 0.5 N s/m."""
-
-    def prepare(settings, seed, young, progress):
-        return FakeBed(size=settings.bed_size, seed=seed, hardness=100.0 + 10.0 * seed, rate=0.5, unload=4000.0)
-
-    monkeypatch.setattr(beds, "prepare_bed", prepare)
-    monkeypatch.setattr(beds, "find_material", lambda name: SAND)
+    lay_closed_form(monkeypatch, beds, SAND)
     monkeypatch.setattr("experiments.runs.whole_runs.write_report", lambda *given: None)
-    monkeypatch.setattr(beds, "bed_step", lambda settings, young: 2e-5)
 
 
 def test_what_the_bed_pushes_with_at_its_surface_is_said_where_it_matters(tmp_path, monkeypatch):

@@ -3,7 +3,7 @@
 import json
 
 import pytest
-from fake_bed import FakeBed
+from fake_bed import FakeBed, lay_closed_form
 from golden import golden
 
 from dem.grains.materials import Material
@@ -24,12 +24,7 @@ NUMBERS = ("stiffness", "damping", "sinkage_dem")
 
 @pytest.fixture(autouse=True)
 def fake(monkeypatch):
-    def prepare(settings, seed, young, progress):
-        return FakeBed(size=settings.bed_size, seed=seed, hardness=100.0 + 10.0 * seed, rate=0.5, unload=4000.0)
-
-    monkeypatch.setattr(beds, "prepare_bed", prepare)
-    monkeypatch.setattr(beds, "find_material", lambda name: SAND)
-    monkeypatch.setattr(beds, "bed_step", lambda settings, young: 2e-5)
+    lay_closed_form(monkeypatch, beds, SAND)
 
 
 @pytest.fixture
