@@ -47,7 +47,10 @@ os.execvp(sys.argv[3], sys.argv[3:])
 _TURN = """(async () => {{
   const viewer = document.querySelector(".scene").viewer;
   await viewer.ready;
+  cancelAnimationFrame(viewer.asked);  // What the page still means to draw by itself, at another resolution
+  clearTimeout(viewer.sharpening);
   viewer.draw({ratio});
+  const size = {{ wide: viewer.canvas.width, high: viewer.canvas.height }};
   const began = performance.now(), drawn = [];
   for (let k = 0; k < {turns}; k++) {{
     viewer.state.az += 0.1;
@@ -56,7 +59,7 @@ _TURN = """(async () => {{
     await new Promise((done) => setTimeout(done));
   }}
   return {{ seconds: (performance.now() - began) / 1e3, drawn: drawn.reduce((a, b) => a + b) / drawn.length,
-    wide: viewer.canvas.width, high: viewer.canvas.height }};
+    ...size }};
 }})()"""
 
 
