@@ -397,7 +397,8 @@ def _kernels(own: _Own) -> tuple[Any, Any]:
                             a = g
                             if inside == 1:
                                 here = ti.max(zs, 1e-300)
-                                a = g - force(here, vs, way, top, deepest, turn_z, turn_w, half.sum(), lane) / m
+                                given = half.sum() + lane[GIVEN_WAY]
+                                a = g - force(here, vs, way, top, deepest, turn_z, turn_w, given, lane) / m
                                 a = a / (1.0 + carried(here, way, lane))
                             weight = dt / 6.0 if stage == 0 or stage == 3 else dt / 3.0
                             z1 += weight * vs
@@ -430,7 +431,7 @@ def _kernels(own: _Own) -> tuple[Any, Any]:
                                 else:
                                     inside, way = 1, 1.0
                                     # On what supports it at the surface it would hop for ever, ever less.
-                                    bears = force(1e-300, 0.0, 1.0, 0.0, deepest, 0.0, 0.0, 0.0, lane)
+                                    bears = force(1e-300, 0.0, 1.0, 0.0, deepest, 0.0, 0.0, lane[GIVEN_WAY], lane)
                                     if v < SETTLED and bears > m * g:
                                         v, resting = 0.0, 1
                                 turn_z, turn_w = 0.0, 0.0
@@ -438,7 +439,7 @@ def _kernels(own: _Own) -> tuple[Any, Any]:
                                 v = 0.0
                                 turn_z, turn_w = z, taken(z, way, turn_z, turn_w, lane)
                                 down, up = 0.0, 0.0
-                                given = gone.sum()
+                                given = gone.sum() + lane[GIVEN_WAY]
                                 for side in range(2):
                                     tried = 1.0 - 2.0 * side
                                     a = g - force(z, 0.0, tried, top, deepest, turn_z, turn_w, given, lane) / m
@@ -457,7 +458,7 @@ def _kernels(own: _Own) -> tuple[Any, Any]:
                     else:
                         pushed, more = 0.0, 0.0
                         if inside == 1 and resting == 0:
-                            pushed = force(z, v, way, top, deepest, turn_z, turn_w, gone.sum(), lane)
+                            pushed = force(z, v, way, top, deepest, turn_z, turn_w, gone.sum() + lane[GIVEN_WAY], lane)
                             more = carried(z, way, lane)
                         out[k, at, 0] = z
                         out[k, at, 1] = v

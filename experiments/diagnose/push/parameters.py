@@ -11,7 +11,12 @@ from experiments.diagnose.fit.problem import Array, Parameter
 from .data import Prepared
 from .forms import Scales
 
-__all__ = ["base_parameters", "comes_back", "diameters_of", "find_scales", "named", "speeds_of"]
+__all__ = [
+    "SURFACE", "base_parameters", "comes_back", "diameters_of", "find_scales", "loose_surface", "named", "speeds_of",
+]  # fmt: skip
+
+SURFACE = "surface"  # the name of `loose_surface`
+_LOOSE = 0.01  # its standard deviation before any reading, over D
 
 
 def diameters_of(trials: Sequence[Prepared]) -> list[float]:
@@ -67,6 +72,17 @@ def _straight_stiffness(tables: PenetrationCampaign, trials: Sequence[Prepared],
             mass, speed = tables.spike.mass or 1.0, trial.table.speed or 0.0
             found.append(mass * (speed**2 + 2 * trial.table.gravity * z) / z**2)
     return float(np.median(found)) if found else max(tables.surface.stiffness, 1e-9)
+
+
+def loose_surface(depth: float) -> Parameter:
+    """How deep below the zero of the depth the bed begins to carry [m], of all trials; `depth`: D, typical of them.
+
+    A tip touches single loose grains first, and the moment of the touch has an error: K is the slope of what follows.
+    """
+    std = _LOOSE * depth
+    return Parameter(
+        name=SURFACE, unit="m", value=0.0, std=std, scale=0.1 * std, lowest=0.0, highest=10.0 * std, step=0.01 * std
+    )
 
 
 def find_scales(tables: PenetrationCampaign, trials: Sequence[Prepared], base: Sequence[Parameter]) -> Scales:

@@ -32,7 +32,9 @@ from .doubt import bounded, jumping, off_rest, off_surface, path_error, reversin
 from .forms import physical, push_forms, unit_of
 from .law import PHASES, fall, push_each
 from .model_file import Pairs, model_of, range_of
-from .parameters import base_parameters, comes_back, diameters_of, find_scales, named, speeds_of
+from .parameters import (
+    SURFACE, base_parameters, comes_back, diameters_of, find_scales, loose_surface, named, speeds_of,
+)  # fmt: skip
 from .remarks import SURE, Push, at_one_speed, contradict, facts, highest_dampings, how_to_determine
 from .slots import PLACES, slot_places, slot_table
 from .stops import doubts_of_damping
@@ -95,6 +97,7 @@ class PenetrationProblem(Problem):
             self.known_std = {"force zero": self._zeros.std}
         self.base = base_parameters(tables, prepared)
         self._scales = find_scales(tables, prepared, self.base)
+        self.base = (*self.base, loose_surface(self._scales.depth))
         self.rough = tuple(trial.info.id for trial in prepared if not trial.driven)
         self.scatter = scatter_parameters(tables, prepared, self._scales)
         parts: list[object] = [repr(tables.uncertainty), repr(tables.sensors), repr(tables.surface)]
@@ -135,6 +138,7 @@ class PenetrationProblem(Problem):
         into[..., PLACES["stiffness"]] = stiffness = k * (1.0 + bed)
         into[..., PLACES["damping"]] = c * (1.0 + bed) * (1.0 + damper)
         into[..., PLACES["unload_change"]] = unloading
+        into[..., PLACES["given_way"]] = [values.get(SURFACE, 0.0) for values in every]
         if trials[0].driven:
             into[..., PLACES["shift_depth"]] = -zero
         sizes, start = np.array([[trial.diameter / self._middle] for trial in trials]), 0
