@@ -18,6 +18,7 @@ __all__ = [
     "OTHERS_NOTE",
     "RANGE_NOTE",
     "SCATTER_NOTE",
+    "SURFACE_NOTE",
     "FORMAT",
     "DepthSensor",
     "EffectTable",
@@ -57,6 +58,8 @@ ERRORS_NOTE = "fitted_errors"
 """A note of model.toml: `names` of the fitted numbers (``stiffness``, ``effect.parameter``), their standard errors
 `std` and `correlation`, rows in the order of `names`; `undetermined`: names of those without a standard error;
 `freedom`: name -> degrees of freedom of its standard error, of those that rest on the scatter of few beds."""
+SURFACE_NOTE = "fitted_surface"
+"""A note of model.toml: `depth_m`, how deep below the zero of the depth the bed begins to carry."""
 SCATTER_NOTE = "fitted_scatter"
 """A note of model.toml of pushes: by what replicates differ beyond the sensors, standard deviations: `bed` relative, of
 K and C, `bed damping` of C and `bed unloading` of the stiffness of the way back; channels and zeros in their unit.
@@ -69,6 +72,7 @@ PEAKS_NOTE = "measured_over_model"
 NOTE_WORDS = {
     BASE_NOTE: "K [N/m] and C [N s/m] of the spring-damper alone, by diameter [m]",
     RANGE_NOTE: "the pushes that the model was fitted to",
+    SURFACE_NOTE: "how deep below the zero of the depth the bed begins to carry: loose grains, errors of the touch",
     ERRORS_NOTE: "standard errors of the fitted numbers, in the order of `names`, and the correlations of each of "
     "these with all, a row for each",
     SCATTER_NOTE: "by what trials of one condition differ beyond the sensors, standard deviations: `bed` relative, of "

@@ -21,7 +21,7 @@ from coupling import Penetration, Run
 from experiments.campaign import PenetrationModel, read_model
 from experiments.campaign.files import MODEL_COPY
 from experiments.campaign.model_errors import ModelErrors, bias_words, errors_of
-from experiments.campaign.tables import BASE_NOTE, PEAKS_NOTE, RANGE_NOTE, SCATTER_NOTE, EffectTable
+from experiments.campaign.tables import BASE_NOTE, PEAKS_NOTE, RANGE_NOTE, SCATTER_NOTE, SURFACE_NOTE, EffectTable
 from experiments.diagnose.fit.forms import OwnEffect, load_own
 from experiments.diagnose.push.forms import push_forms
 from experiments.diagnose.push.law import PHASES, fall, given_way, push
@@ -79,6 +79,10 @@ def read_law(path: str | Path, settings: PenetrateSettings) -> "AmendedLaw":
             slots[name] = value
     springs = tuple(name for name in slots if known.get(name, "").startswith("spring"))
     law = AmendedLaw(settings, model, {}, tuple(own), errors=errors_of(str(path), model), springs=springs)
+    try:
+        _ = law.surface_depth
+    except ValueError as refused:
+        raise ValueError(f"{path}: {refused}") from None
     stiffer = law.pair[0] / model.surface.stiffness if model.surface.stiffness > 0 else 1.0
     factors = {name: stiffer if name in springs else size ** _POWERS.get(known.get(name, ""), 0) for name in slots}
     return replace(law, slots={name: value * factors[name] for name, value in slots.items()}, factors=factors)
@@ -227,6 +231,17 @@ class AmendedLaw:
         )
         return said + ([] if self.saw_withdrawal else [say("way_out_unseen")])
 
+    @cached_property
+    def surface_depth(self) -> float:
+        """Depth at which the bed begins to carry [m], as it was fitted; 0 of a file that has none.
+
+        Raises ValueError for anything but a number of 0 or more."""
+        note = self.model.notes.get(SURFACE_NOTE, {})
+        found = note.get("depth_m", 0.0) if isinstance(note, Mapping) else note
+        if not isinstance(found, int | float) or not 0.0 <= found < math.inf:
+            raise ValueError(f"[notes] {SURFACE_NOTE} depth_m = {found!r}: 0 or more was expected [m]")
+        return float(found)
+
     @property
     def saw_withdrawal(self) -> bool:
         """Whether a push that the model was fitted to came out again, as far as its file states it."""
@@ -264,7 +279,7 @@ class AmendedLaw:
         settings, (stiffness, damping) = self.settings, self.pair
         table = slot_table(1, self.own)
         values = {"mass": settings.mass, "gravity": settings.weight / settings.mass, "speed_scale": creep * speed}
-        values |= {"stiffness": stiffness, "damping": damping}
+        values |= {"stiffness": stiffness, "damping": damping, "given_way": self.surface_depth}
         values["radius_depth"] = max(settings.tip_height, 1e-4 * settings.tip_diameter)
         for name, value in (values | dict(self.slots)).items():
             table[0, _SLOT[name]] = value
@@ -337,6 +352,7 @@ class AmendedGround:
         self._numbers = law.numbers(speed=speed, creep=_CREEP)
         self._top = self._ever = 0.0
         self._gone = given_way(self._numbers[0], None, 0.0, 0.0, self._own)
+        self._loose = law.surface_depth
 
     def describe(self) -> Json:
         """What it is, in plain numbers."""
@@ -352,7 +368,7 @@ class AmendedGround:
         lane, path = np.zeros(1, np.int32), np.array([0, 4], np.int32)
         if middle > 0:
             gone = given_way(self._numbers[0], self._gone, middle, 0.5 * dt, self._own)
-            self._numbers[0, _SLOT["given_way"]] = gone.sum()
+            self._numbers[0, _SLOT["given_way"]] = self._loose + gone.sum()
         force = float(push(self._numbers, lane, path, depth, speed, self._own)[0, 3])
         self._top = max(self._top, start, end) if end > 0 else 0.0
         self._ever = max(self._ever, end, 0.0)

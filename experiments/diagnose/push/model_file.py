@@ -11,6 +11,7 @@ from experiments.campaign.tables import (
     PEAKS_NOTE,
     RANGE_NOTE,
     SCATTER_NOTE,
+    SURFACE_NOTE,
 )  # fmt: skip
 
 from .data import Prepared
@@ -24,18 +25,21 @@ Pairs = dict[str, dict[str, float]]
 
 def model_of(
     tables: PenetrationCampaign, middle: float, pairs: Pairs, plain: Pairs, effects: Sequence[EffectTable],
-    covered: Mapping[str, Any], more: Mapping[str, Mapping[str, object]],
+    covered: Mapping[str, Any], surface_depth: float, more: Mapping[str, Mapping[str, object]],
 ) -> PenetrationModel:  # fmt: skip
     """The tables of model.toml. `middle`: the diameter [m] whose K and C stand in [surface]; `pairs`: K and C beside
     the effects; `plain`: those of the base model that was fitted without effects, empty where there are none;
-    `covered`: the range of the campaign's trials (`range_of`), noted; `more`: further notes, by name."""
-    ours = (BASE_NOTE, RANGE_NOTE, ERRORS_NOTE, SCATTER_NOTE, OTHERS_NOTE, PEAKS_NOTE)
+    `covered`: the range of the campaign's trials (`range_of`), noted; `surface_depth`: where the bed begins to carry
+    [m], noted; `more`: further notes, by name."""
+    ours = (BASE_NOTE, RANGE_NOTE, SURFACE_NOTE, ERRORS_NOTE, SCATTER_NOTE, OTHERS_NOTE, PEAKS_NOTE)
     notes: dict[str, Any] = {name: note for name, note in tables.notes.items() if name not in ours}
     notes |= {name: dict(note) for name, note in more.items()}
     if plain:
         notes[BASE_NOTE] = plain
     if covered:
         notes[RANGE_NOTE] = dict(covered)
+    if surface_depth > 0:
+        notes[SURFACE_NOTE] = {"depth_m": float(f"{surface_depth:.6g}")}
     if len(pairs) > 1:
         notes["fitted_by_diameter"] = pairs
     same = {name: getattr(tables, name) for name in ("format", "kind", "name", "uncertainty", "sensors")}

@@ -15,7 +15,7 @@ __all__ = [
     "SURFACE", "base_parameters", "comes_back", "diameters_of", "find_scales", "loose_surface", "named", "speeds_of",
 ]  # fmt: skip
 
-SURFACE = "surface"  # the name of `loose_surface`
+SURFACE = "surface_depth"  # the name of `loose_surface`
 _LOOSE = 0.01  # its standard deviation before any reading, over D
 
 

@@ -32,9 +32,7 @@ from .doubt import bounded, jumping, off_rest, off_surface, path_error, reversin
 from .forms import physical, push_forms, unit_of
 from .law import PHASES, fall, push_each
 from .model_file import Pairs, model_of, range_of
-from .parameters import (
-    SURFACE, base_parameters, comes_back, diameters_of, find_scales, loose_surface, named, speeds_of,
-)  # fmt: skip
+from .parameters import SURFACE, base_parameters, comes_back, diameters_of, find_scales, loose_surface, named, speeds_of
 from .remarks import SURE, Push, at_one_speed, contradict, facts, highest_dampings, how_to_determine
 from .slots import PLACES, slot_places, slot_table
 from .stops import doubts_of_damping
@@ -95,20 +93,20 @@ class PenetrationProblem(Problem):
         if self._zeros is not None:
             self.findings = (*self.findings, self._zeros.finding)
             self.known_std = {"force zero": self._zeros.std}
-        self.base = base_parameters(tables, prepared)
-        self._scales = find_scales(tables, prepared, self.base)
-        self.base = (*self.base, loose_surface(self._scales.depth))
+        base = base_parameters(tables, prepared)
+        self._scales = find_scales(tables, prepared, base)
+        self.base = (*base, loose_surface(self._scales.depth))
         self.rough = tuple(trial.info.id for trial in prepared if not trial.driven)
         self.scatter = scatter_parameters(tables, prepared, self._scales)
         parts: list[object] = [repr(tables.uncertainty), repr(tables.sensors), repr(tables.surface)]
         parts += [(t.info.condition, len(t.time), round(float(t.time[-1]), 3)) for t in prepared]
         self.design = hashlib.sha256(repr(parts).encode()).hexdigest()[:16]
-        speeds = np.array([s for trial in prepared for s in speeds_of(trial)])
         self.covered, self.typical_depth = range_of(prepared, frame), self._scales.depth
         self.how_to_determine = how_to_determine(self.covered.get("speed_m_s", ()))
-        differ = speeds.max() > 1.05 * max(speeds.min(), 1e-12)
+        speeds = [float(speed) for trial in prepared for speed in speeds_of(trial)]
         self.forms = push_forms(
-            retreats=comes_back(prepared), speeds_differ=bool(differ), drops=bool(self.rough), own=own
+            retreats=comes_back(prepared), drops=bool(self.rough), own=own,
+            speeds_differ=max(speeds) > 1.05 * max(min(speeds), 1e-12),
         )  # fmt: skip
         self.shapes = shapes_of(self.forms, again=True)
         self._places = slot_places(own)
@@ -167,8 +165,7 @@ class PenetrationProblem(Problem):
 
     def _number(self, values: Values, which: str, diameter: float) -> float:
         """K or C, ``stiffness`` or ``damping``, of a diameter."""
-        name, stated = self._stated(which, diameter)
-        return values.get(name, stated)
+        return values.get(*self._stated(which, diameter))
 
     def _stated(self, which: str, diameter: float) -> tuple[str, float]:
         """The parameter that is K or C of a diameter, and its value where none is given."""
@@ -280,8 +277,8 @@ class PenetrationProblem(Problem):
             turn, held = turning(smooth.speed[rows], smooth.speed_std[rows], trial.other[rows], std_force)
             shaken = self._along.get(trial.info.id, 0.0)
             doubtful = np.sqrt(1 + (jumps[rows] + turn**2) / std_force**2 + shaken**2)
-            factor = np.column_stack([factor[rows], held])
-            left, sizes, _ = np.linalg.svd(factor / std_force / doubtful[:, None], full_matrices=False)
+            factor = np.column_stack([factor[rows], held]) / std_force / doubtful[:, None]
+            left, sizes, _ = np.linalg.svd(factor, full_matrices=False)
             kept = sizes > 1e-3
             left, shrink = left[:, kept], 1 - 1 / np.sqrt(1 + sizes[kept] ** 2)
             self._whitening[trial.info.id] = (left, shrink[:, None] * left.T, std_force * doubtful)
@@ -400,7 +397,7 @@ class PenetrationProblem(Problem):
     def compare(self, values: Values, forms: Sequence[Form], trial: str) -> dict[str, dict[str, Array]]:
         """See `Problem`."""
         this = self.prepared[trial]
-        _, _, _, model = self._state(values, forms, trial)
+        model = self._state(values, forms, trial)[3]
         if this.smooth is not None:
             columns = {"t_s": this.time, "measured": this.other, "model": model, "depth_m": this.smooth.depth}
             return {"force": {name: column[this.has_other] for name, column in columns.items()}}
@@ -426,8 +423,8 @@ class PenetrationProblem(Problem):
             for form in forms
         )  # fmt: skip
         pairs = (self._pairs(values), self._pairs(base) if forms and base is not None else {})
-        model = model_of(self.tables, self._middle, *pairs, effects, self.covered, notes or {})
-        write_model(Path(path), model)
+        noted = (self.covered, float(values.get(SURFACE, 0.0)), notes or {})
+        write_model(Path(path), model_of(self.tables, self._middle, *pairs, effects, *noted))
 
     def _pairs(self, values: Values) -> Pairs:
         """Diameter [m] as text -> K [N/m] and C [N s/m]."""

@@ -12,6 +12,7 @@ from coupling import Penetration
 from experiments.campaign.model_errors import SHARE, ModelErrors
 from experiments.diagnose.fit.forms import OwnEffect
 from experiments.diagnose.push.law import push
+from experiments.diagnose.push.parameters import SURFACE
 from experiments.diagnose.push.slots import SLOTS, slot_places
 from experiments.runs.types import Json
 from rigid.intervals import joint_freedom
@@ -22,6 +23,7 @@ __all__ = ["Law", "PeakError", "peak_error", "peak_of", "returned_std", "with_fi
 Array = NDArray[np.float64]
 say = Sentences(__package__)
 _SLOT = {name: place for place, name in enumerate(SLOTS)}
+_PLACES = {SURFACE: "given_way"}  # fitted numbers whose place in the law has another name
 
 
 class Law(Protocol):
@@ -141,7 +143,7 @@ def _moved(law: Law, like: Penetration) -> Array | None:
         return None
     table = _lanes(law, like, 2 * len(errors.names))
     for k, (name, std) in enumerate(zip(errors.names, errors.std, strict=True)):
-        slot = name if name in places else name.rpartition(".")[2]  # effects from files have their name in front
+        slot = _PLACES.get(name) or (name if name in places else name.rpartition(".")[2])  # without the file's effect
         if slot in places:  # K and C of other diameters are in none
             step = SHARE * std * law.factors.get(slot, 1.0)
             table[2 * k : 2 * k + 2, places[slot]] += step, -step
