@@ -27,6 +27,7 @@ from .fit.gaps import numeral
 from .fit.problem import Problem
 from .noise.colour import together
 from .push.frame import at_the_tip
+from .push.parameters import SURFACE
 from .report.document import write_diagnosis
 from .report.sentences import findings_in_words, told_tables, where_sentences
 from .report.spread import spread_sentences
@@ -171,11 +172,16 @@ def _result(found: Diagnosis, diagnosis: Json, made_up: str | None) -> Result:
     if is_strained(found.best):
         unknown = found.verdict == "unknown"
         beside = "it does not explain the data" if unknown else "it absorbs a difference in structure"
-    for model, bounds, meaning in (
-        ("the base model", found.bounds_before, "it bends them because something is missing"),
-        ("the best model", found.bounds_after if found.forms else (), beside),
+    for model, bounds, meaning, beyond in (  # a bent spring looks like a straight one that begins deeper
+        (
+            "the base model",
+            found.bounds_before,
+            "it bends them because something is missing",
+            {SURFACE} if found.forms else {},
+        ),
+        ("the best model", found.bounds_after if found.forms else (), beside, {}),
     ):
-        strained = [bound.words for bound in bounds if bound.strains]
+        strained = [bound.words for bound in bounds if bound.strains and bound.parameter not in beyond]
         if strained:
             warnings.append(f"fitted by {model} as far from what was stated as no true number is: "
                             f"{', '.join(strained)}; {meaning}")  # fmt: skip

@@ -235,7 +235,7 @@ class AmendedLaw:
     def surface_depth(self) -> float:
         """Depth at which the bed begins to carry [m], as it was fitted; 0 of a file that has none.
 
-        Raises ValueError for anything but a number of 0 or more."""
+        Raises ValueError for anything but a depth of 0 or more."""
         note = self.model.notes.get(SURFACE_NOTE, {})
         found = note.get("depth_m", 0.0) if isinstance(note, Mapping) else note
         if not isinstance(found, int | float) or not 0.0 <= found < math.inf:

@@ -74,15 +74,19 @@ def answer_tiles(result: Result) -> list[Tile]:
     ]
     if weighed := numbers.get(f"gap_with_scatter_after_{part}"):
         tiles.append(Tile(say("gap_scatter", where=where), fitted(weighed), which))
-    named = [name for name in numbers if "." in name] + [name for name in numbers if name.endswith("_after")]
+    effects = [name for name in numbers if "." in name and "@" not in name]
+    named = effects + [name for name in numbers if name.endswith("_after")]
     tiles += [_tile_of(name, numbers[name]) for name in named]
     return tiles[:MOST_ROWS]
 
 
 def _tile_of(name: str, entry: Result) -> Tile:
     """A fitted number with half of its 95 % interval, or why it has none."""
-    effect, _, own = name.rpartition(".")
-    label = capital(own.removesuffix("_after").replace("_", " ")) + (f" ({effect})" if effect else "")
+    own, at, size = name.removesuffix("_after").partition("@")
+    of = f"{1e3 * float(size):g} mm" if at else ""
+    if not at:
+        of, _, own = own.rpartition(".")
+    label = capital(own.replace("_", " ")) + (f" ({of})" if of else "")
     note, unit = str(entry.get("note", "")).replace("standard error of the fit", "error of the fit"), entry["unit"]
     if entry["std"]:
         return Tile(label, fitted(entry), note)

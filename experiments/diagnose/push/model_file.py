@@ -38,7 +38,7 @@ def model_of(
         notes[BASE_NOTE] = plain
     if covered:
         notes[RANGE_NOTE] = dict(covered)
-    if surface_depth > 0:
+    if surface_depth:
         notes[SURFACE_NOTE] = {"depth_m": float(f"{surface_depth:.6g}")}
     if len(pairs) > 1:
         notes["fitted_by_diameter"] = pairs

@@ -77,7 +77,8 @@ def _straight_stiffness(tables: PenetrationCampaign, trials: Sequence[Prepared],
 def loose_surface(depth: float) -> Parameter:
     """How deep below the zero of the depth the bed begins to carry [m], of all trials; `depth`: D, typical of them.
 
-    A tip touches single loose grains first, and the moment of the touch has an error: K is the slope of what follows.
+    A tip touches single loose grains first, and a touch may be seen too early: K is the slope of what follows. It is
+    never above the zero, since readings there have no force.
     """
     std = _LOOSE * depth
     return Parameter(

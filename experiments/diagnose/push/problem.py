@@ -228,7 +228,7 @@ class PenetrationProblem(Problem):
         rest = trial.other - model if trial.has_other.all() else (trial.other - model)[:, trial.has_other]
         rest /= noise
         if len(directions.T):
-            rest -= (rest @ directions) @ shrunk
+            rest -= np.stack([(one @ directions) @ shrunk for one in rest])  # each alone: the same bits beside others
         return bounded(rest)
 
     def _missed(self, trial: Prepared, model: Array) -> Array:

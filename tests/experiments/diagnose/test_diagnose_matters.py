@@ -23,9 +23,9 @@ def base(z, v, top):
     return STIFFNESS * z + DAMPING * max(v, 0.0)
 
 
-def toe(z, v, top):
-    """The same, but the first grains are loose: 1.1 noises at most, over half a millimetre."""
-    return base(z, v, top) - STIFFNESS * 6e-5 * (1.0 - np.exp(-max(z, 0.0) / 5e-4))
+def ripple(z, v, top):
+    """The same, but the bed jams and gives way every 7 mm: 0.55 noises at most."""
+    return base(z, v, top) + 0.55 * FORCE_STD * np.sin(2 * np.pi * z / 7e-3)
 
 
 def pushes(force, speeds, **more):
@@ -50,7 +50,7 @@ def test_speeds_that_change_the_force_by_less_than_its_noise_make_one_condition(
 
 
 def test_a_structural_residue_too_small_to_matter_is_no_verdict_of_unknown():
-    found = diagnose(make_problem(pushes(toe, [0.01, 0.01, 0.05, 0.05, 0.01, 0.05])))
+    found = diagnose(make_problem(pushes(ripple, [0.01, 0.01, 0.05, 0.05, 0.01, 0.05])))
     assert not found.gate_before.passed  # the sensors can tell
     assert (found.verdict, found.effects) == ("none", ())
     assert 1.0 < found.before.fit <= matters.MOST

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from penetration_campaigns import DAMPING, STIFFNESS, campaign_of, driven_trial
+from penetration_campaigns import DAMPING, STIFFNESS, campaign_of, driven_trial, on_firm_ground
 
 from experiments.diagnose.core.diagnosis import diagnose
 from experiments.diagnose.core.matters import undecided
@@ -27,7 +27,7 @@ def constant(z, v, top=0.0):
 def fitted(speeds):
     """The base model, constant friction and drag by the square of the speed, fitted to a constant force of 1 N."""
     trials = [(f"{k}", "driven", v, driven_trial(constant, speed=v, seed=k)) for k, v in enumerate(speeds)]
-    problem = make_problem(campaign_of(trials, doubt=(0.1, 0.05)))
+    problem = on_firm_ground(make_problem(campaign_of(trials, doubt=(0.1, 0.05))))
     base = fit(Model(problem, Whitener.white(problem), tuple(t.id for t in problem.trials)))
     problem.rewhiten(base.values, ())
     base = fit(base.model, base.values)
