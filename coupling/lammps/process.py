@@ -45,6 +45,8 @@ _ENVIRONMENT = {
     "OMPI_MCA_mpi_yield_when_idle": "1", "OMPI_MCA_rmaps_base_oversubscribe": "1",
     "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
 }  # fmt: skip
+# Open MPI binds the first rank of each job to the first core: several runs would share it while others are idle.
+_UNBOUND = {"OMPI_MCA_hwloc_base_binding_policy": "none", "PRTE_MCA_hwloc_default_binding_policy": "none"}
 
 
 class LammpsMissingError(RuntimeError):
@@ -178,7 +180,7 @@ class Lammps:
                     sys.executable, "-I", "-S", watch.__file__, str(self.folder), launcher, "-n", str(ranks), program,
                     "-in", "commands", "-log", "log.txt", "-screen", "none",
                 ],
-                env={**os.environ, **_ENVIRONMENT}, stdin=subprocess.PIPE, stdout=said, stderr=subprocess.STDOUT,
+                env={**_UNBOUND, **os.environ, **_ENVIRONMENT}, stdin=subprocess.PIPE, stdout=said, stderr=subprocess.STDOUT,
                 start_new_session=True,
             )  # fmt: skip
         self._commands = self._open_commands()
