@@ -180,8 +180,8 @@ class Lammps:
                     sys.executable, "-I", "-S", watch.__file__, str(self.folder), launcher, "-n", str(ranks), program,
                     "-in", "commands", "-log", "log.txt", "-screen", "none",
                 ],
-                env={**_UNBOUND, **os.environ, **_ENVIRONMENT}, stdin=subprocess.PIPE, stdout=said, stderr=subprocess.STDOUT,
-                start_new_session=True,
+                env={**_UNBOUND, **os.environ, **_ENVIRONMENT}, stdin=subprocess.PIPE, stdout=said,
+                stderr=subprocess.STDOUT, start_new_session=True,
             )  # fmt: skip
         self._commands = self._open_commands()
 
