@@ -4,8 +4,8 @@
 foot has one point in contact (ball, ellipsoid, capsule on its end) or two (capsule and cylinder that lie). A box has 4
 of 8, a cylinder on its end and a mesh have 8. The points of the irregular mesh have no symmetry. It goes in and slides.
 Besides every law with its defaults: the law of sand of each foot (`law_of_run`), the same with loss as the foot
-retreats in its crater, and a ground.toml of `hedgebed calibrate`, which is kept. Several rounds by processor time; the median counts. For quick trials, in the environment:
-HEDGEBED_BENCH_CALLS, HEDGEBED_BENCH_ROUNDS.
+retreats in its crater, and a kept ground.toml of `hedgebed calibrate`. Several rounds by processor time; the median
+counts. For quick trials, in the environment: HEDGEBED_BENCH_CALLS, HEDGEBED_BENCH_ROUNDS.
 """
 
 import statistics
