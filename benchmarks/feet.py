@@ -3,9 +3,9 @@
 `coupling.robot.FootForces` is called as MuJoCo calls it, with every foot in contact: robots of one foot and of six. A
 foot has one point in contact (ball, ellipsoid, capsule on its end) or two (capsule and cylinder that lie). A box has 4
 of 8, a cylinder on its end and a mesh have 8. The points of the irregular mesh have no symmetry. It goes in and slides.
-Besides every law with its defaults: the law of sand of each foot (`law_of_run`), the same with loss as the foot
-retreats in its crater, and a kept ground.toml of `hedgebed calibrate`. Several rounds by processor time; the median
-counts. For quick trials, in the environment: HEDGEBED_BENCH_CALLS, HEDGEBED_BENCH_ROUNDS.
+Besides every law with its defaults: the law of sand of each foot (`law_of_run`), and the same with loss as the foot
+retreats in its crater. A kept ground.toml of `hedgebed calibrate` is timed too. Several rounds by processor time; the
+median counts. For quick trials, in the environment: HEDGEBED_BENCH_CALLS, HEDGEBED_BENCH_ROUNDS.
 """
 
 import statistics
