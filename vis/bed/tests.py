@@ -50,7 +50,7 @@ def write_test_report(report: Report) -> Path:
     bed = say("first_bed", one=one, sides=sides, step=1e6 * one["time_step"], **scaled)
     sections = [
         Section("", [*tables(result), *(block for draw in plots for block in draw(report))]),
-        Section("How it is measured", [*(text(words) for words in method), text(bed)]),
+        Section("How it is computed", [*(text(words) for words in method), text(bed)]),
         report.numbers(std=True),
         again(f"hedgebed {command} run.toml"),
     ]
