@@ -24,7 +24,7 @@ from .settings import SweepSettings
 __all__ = ["check", "resume", "run"]
 
 _REPORT = 5.0  # What the table and the page take [s]
-_ONE_BY_ONE = "one run after the other, since dask is not installed: pip install 'hedgebed[sweep]' for several at a time"
+_ONE_BY_ONE = "one run after the other, without dask: pip install 'hedgebed[sweep]' for several at a time"
 
 
 def check(settings: SweepSettings) -> None:

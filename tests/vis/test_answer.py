@@ -302,8 +302,8 @@ def test_a_terminal_ends_with_words_and_not_with_keys(name):
 def test_errors_that_no_row_of_a_bed_knows_are_named_below_the_table():
     result = read_result(KEPT / "bed-test-repose" / "result.json")
     shown = headline_of(EXPERIMENTS["bed test repose"], result)
-    assert shown.rows[0] == ("Angle of repose", "31.2°", "1.5°")
-    assert shown.head == ("", "value", "± chance")
+    assert shown.rows[0] == ("Angle of repose", "31°", "4°")  # 4.303 x 1.515 / sqrt(3)
+    assert shown.head == ("", "value", "± chance (95\N{NO-BREAK SPACE}%)")
     assert all(name in shown.notes[0] for name in ("grain size", "softness"))
 
 

@@ -117,7 +117,7 @@ def _errors(result: Mapping[str, Any], on_grains: bool) -> tuple[Sequence[str], 
     keys = ["empty_cells"] if on_grains else []
     if experiment == "diagnose":
         return (say("of_fit"), *_ERRORS[1:]), keys
-    if experiment == "bed calibrate":
+    if str(experiment).startswith(("bed calibrate", "bed test")):
         return (say("of_95"), *_ERRORS[1:]), keys
     if experiment == "ground":
         return (say("of_map"), *_ERRORS[1:]), ["sum_of_map"]
