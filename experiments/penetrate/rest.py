@@ -63,6 +63,8 @@ def answer(findings: Findings, material: Any) -> Json | None:
     """
     settings = findings.settings
     stood = findings.of("set_down")
+    if not (settings.set_down or (settings.dropped_speeds and beds.sinks_away(settings))):
+        return None  # nobody asked
     if stood and not all(run.ended == "max_depth" for run in stood):
         rests = any(depth is not None for depth in findings.sinkages(findings.beds))
         return _stuck(settings, material) if rests and settings.tip == "flat" else None

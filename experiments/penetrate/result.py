@@ -222,7 +222,7 @@ def _not_separated(findings: Findings) -> Iterator[str]:
     conditions = {unit.condition for unit in findings.units if unit.id in fit.runs}
     own = [one.correlation for one in findings.seed_fits.values() if one.correlation is not None]
     each = len(own) >= 2 and not findings.beds_separate
-    needed = "" if findings.of("set_down") else say("rest_needs_k")
+    needed = "" if findings.of("set_down") or not findings.settings.set_down else say("rest_needs_k")
     if len(conditions) < LEAST_CONDITIONS or abs(fit.correlation or 0.0) > MOST_CORRELATED:
         shown = "unknown" if fit.correlation is None else f"{fit.correlation:.2f}"
         listed = ", ".join(f"{kind} at {v:g} m/s" for kind, v in sorted(conditions))
@@ -238,7 +238,7 @@ def softening_note(settings: PenetrateSettings, softening: Softening) -> str:
         "a driven run": (*settings.speeds, *settings.other_speeds[: len(settings.seeds) - 1]),
         "the pull-out": (settings.retreat_speed,),
         "a drop": (*settings.drop_speeds, *settings.other_drop_speeds),
-        "the lowering": (settings.lowering_speed,),
+        "the lowering": (settings.lowering_speed,) if settings.set_down else (),
     }
     whose = next((name for name, speeds in fastest.items() if softening.speed in speeds), "the fastest run")
     return say("softened", softening=softening, percent=100 * settings.max_overlap, whose=whose)
