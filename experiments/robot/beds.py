@@ -23,7 +23,7 @@ from .forms import NO_FORMS, Forms, expected_words, with_grains
 from .on_grains import RobotOnBed
 from .plan import CONTROLLER, MODEL, RobotPlan
 from .settings import RobotSettings
-from .sure import ANSWER, answer_of, entry, in_words
+from .sure import ANSWER, DISTANCE, answer_of, entry, in_words
 
 __all__ = ["carry_out_beds", "over_beds"]
 
@@ -95,7 +95,7 @@ def over_beds(seeds: Sequence[int], results: Sequence[Mapping[str, Any]]) -> Res
         for result, hop in zip(results, hops, strict=True)
     ]
     sure: Json = {}
-    for name in ANSWER:
+    for name in (name for name in answers[0] if all(name in answer for answer in answers)):
         found = interval_of([answer[name] for answer in answers])
         assert found is not None and found.half is not None
         sure[name] = entry(name, found.mean, found.mean - found.half, found.mean + found.half)
@@ -177,11 +177,14 @@ def _of_its_own(result: Mapping[str, Any]) -> Json:
 
 def _each(seeds: Sequence[int], results: Sequence[Mapping[str, Any]], answers: Sequence[Mapping[str, float]]) -> Json:
     """A table with the answer of each bed."""
+    along = {DISTANCE: "m"} if all(DISTANCE in answer for answer in answers) else {}
+    units = {**ANSWER, **along}
     rows = [
-        [str(seed), *(in_words_of({"value": answer[name], "std": 0.0, "unit": unit}) for name, unit in ANSWER.items())]
+        [str(seed), *(in_words_of({"value": answer[name], "std": 0.0, "unit": unit}) for name, unit in units.items())]
         for seed, answer in zip(seeds, answers, strict=True)
     ]
     head = ["seed", "rise", "longest flight", "clearance", "sinkage", "largest force"]
+    head += ["distance of the hop"] if along else []
     return {"title": say("each_bed"), "head": head, "rows": rows}
 
 

@@ -146,7 +146,7 @@ def _errors_of_robot(result: Mapping[str, Any], on_grains: bool) -> tuple[Sequen
     if on_grains:
         return (chance, _ERRORS[1], say("with_laws") if forms else _ERRORS[2]), [key for key, so in told.items() if so]
     first = say("of_the_law") if "ground_file" in result else say("left_open")
-    return (first, _ERRORS[1], say("over_laws")), [key for key, so in told.items() if so]
+    return (first, _ERRORS[1], say("over_laws" if forms else "other_laws")), [key for key, so in told.items() if so]
 
 
 def _row(tile: Tile) -> tuple[str, ...]:
