@@ -44,7 +44,7 @@ def resolution_of(settings: PenetrateSettings) -> dict[str, Any]:
     """What `resolution_advice` asks of a bed and its tip."""
     return {
         "tip": settings.tip_diameter, "grain": settings.grain, "depth": settings.depth, "size": settings.bed_size,
-        "cohesive": find_material(settings).cohesion != "none",
+        "cohesive": find_material(settings).cohesion != "none", "flat": settings.tip == "flat",
     }  # fmt: skip
 
 
