@@ -22,7 +22,7 @@ from .departures import departures, with_half
 from .findings import BedFacts, Findings, bed_entry, bed_quantities, drop_note
 from .fit import MOST_CORRELATED
 from .reference import compare_with, read_reference
-from .rest import answer, how_sure, sinkage_interval
+from .rest import answer, how_sure, real_grain, sinkage_interval
 from .settings import PenetrateSettings, say
 from .similarity import fast_for_gravity, pace_of, similarity_of
 from .sure import ends_of, in_words
@@ -106,6 +106,7 @@ def conclude(
         "departures": departures,
         "bed": bed_entry(facts, settings, softening) | {
             "material": material.name, "rolling_friction": material.rolling_friction, "stiffened": stiffened,
+            "real_grain": real_grain(settings, material) or None,
             **({"missing": {str(seed): why for seed, why in missing.items()}} if missing else {}),
         },
         "spike": asdict(make_spike(settings)) | {"load": settings.weight},
