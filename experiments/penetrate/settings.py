@@ -102,8 +102,12 @@ class PenetrateSettings(StrictSettings):
     platform in the rig, (m + m_b) / 4, is 2.63 kg. A free drop in a laboratory has load = mass x g."""
 
     # What is done with it
-    speeds: tuple[Positive, ...] = Field((0.1, 0.2, 0.4), min_length=1, description="Speeds of pushes [m/s].")
-    depth: Positive = Field(0.012, description="Depth of pushes [m].")
+    speeds: tuple[Positive, ...] = Field((0.1, 0.2, 0.4), min_length=1)
+    """Speeds of pushes [m/s]. The default is for a tip of 12 mm; for a similar push of another tip multiply it by the
+    square root of tip_diameter / 12 mm."""
+    depth: Positive = 0.012
+    """Depth of pushes [m]. The default is for a tip of 12 mm; for a similar push of another tip multiply it by
+    tip_diameter / 12 mm."""
     hold: NotNegative = Field(0.01, description="Time for which a pushed spike is held at depth [s].")
     retreat_speed: Positive = Field(0.4, description="Speed of withdrawal [m/s].")
     drop_speeds: tuple[Positive, ...] = (0.1, 0.15, 0.2)
