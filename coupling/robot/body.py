@@ -397,8 +397,10 @@ class MujocoRobot:
         return np.where(self.moving, self.model.body_mass, 0.0)
 
     def onward(self, most_steps: int = 100_000) -> tuple[float, float, Vector] | None:
-        """How a flight goes on without the ground: rise of the centre of mass from here [m], 0 where it falls, time
-        until the lowest foot is at the surface [s], and the way of the centre of mass along the ground, shape (2,) [m].
+        """How a flight goes on without the ground, until the lowest foot is at the surface.
+
+        Three numbers are returned: rise of the centre of mass from here [m], 0 where it falls; time [s]; and way of the
+        centre of mass along the ground by then [m], shape (2,).
 
         MuJoCo steps a copy, with the joints' friction and the controls of now; the controller is not called. None where
         no foot comes to the surface within `most_steps`.

@@ -12,7 +12,7 @@ from experiments.robot.on_grains import RobotFollowed
 from experiments.robot.plan import plan_robot
 from experiments.robot.result import conclude
 from experiments.robot.settings import RobotSettings
-from vis.robot.answer import answer_tiles
+from vis.robot.answer import DISTANCE, answer_tiles
 
 pytest.importorskip("mujoco", reason="mujoco is not installed: pip install 'hedgebed[mujoco]'")
 
@@ -111,7 +111,7 @@ def test_the_distance_of_a_hop_is_that_of_its_longest_flight_also_where_the_run_
     assert short.quantities["hop_distance"].value == pytest.approx(distance, rel=0.02)
     assert [said for said in whole["departures"]["sentences"] if f"{1e3 * distance:.0f} mm along" in said]
     tiles = [tile.label for tile in answer_tiles(whole)]
-    assert len(tiles) == 6 and "Distance of the hop" in tiles
+    assert len(tiles) == 6 and DISTANCE[0] in tiles
 
 
 def test_a_robot_that_is_still_falling_at_the_end_is_told_of_it_before_and_a_run_of_that_length_touches(
