@@ -119,6 +119,11 @@ def test_a_robot_that_starts_above_the_surface_states_the_height_below_its_rise(
     said = [answer(answer_tiles(robot_result()), robot_result(ground="rft", start_height=high))[-1].text
             for high in (0.01, 0.0)]  # fmt: skip
     assert "10\N{NO-BREAK SPACE}mm above" in said[0] and "mm above" not in said[1]
+    hops = robot_result(ground="rft", start_height=0.01)
+    hops["quantities"]["hop_distance"] = {"value": 0.3, "std": None, "unit": "m"}
+    shown = answer(answer_tiles(hops), hops)
+    assert "Clearance" in said[0] and "Clearance" not in shown[-1].text
+    assert [row[0] for row in shown[0].rows][1] == "Distance of the hop"
 
 
 def test_a_flight_that_the_run_cuts_off_heads_the_answer_with_its_apex():

@@ -137,9 +137,11 @@ def _errors_of_robot(result: Mapping[str, Any], on_grains: bool) -> tuple[Sequen
     forms, hop = "forms" in result, result.get("hop", True)
     rise = [result["quantities"].get("highest", {}).get("value")] if hop else []
     rise += [one["low"] for one in [(result.get("forms") or {}).get("ranges", {}).get("highest")] if one]
+    lifted = hop and (result.get("start_height") or 0.0) > LIFTED
+    along = (result["quantities"].get("hop_distance") or {}).get("value") is not None  # in place of the clearance
     told = {
         "one_bed": on_grains and "beds" not in result, "laws_of_sand": forms and not on_grains,
-        "laws_and_grains": forms and on_grains, "start_of_rise": hop and (result.get("start_height") or 0.0) > LIFTED,
+        "laws_and_grains": forms and on_grains, "start_of_rise": lifted, "of_clearance": lifted and not along,
         "below_start": any((one or 0.0) < 0 for one in rise), "no_error": True,
     }  # fmt: skip
     chance = say("of_95") if "beds" in result else _ERRORS[0]
