@@ -18,7 +18,7 @@ from vis.page.page import Page, Section, Tile, listing, text
 from vis.page.sentences import label_of
 from vis.paper.report import CASE_HEAD
 from vis.report import write_report
-from vis.robot.answer import answer_tiles
+from vis.robot.answer import DISTANCE, answer_tiles
 from vis.tumble.answer import answer_tiles as tumble_tiles
 from vis.tumble.beside import beside_rows
 
@@ -123,7 +123,7 @@ def test_a_robot_that_starts_above_the_surface_states_the_height_below_its_rise(
     hops["quantities"]["hop_distance"] = {"value": 0.3, "std": None, "unit": "m"}
     shown = answer(answer_tiles(hops), hops)
     assert "Clearance" in said[0] and "Clearance" not in shown[-1].text
-    assert [row[0] for row in shown[0].rows][1] == "Distance of the hop"
+    assert [row[0] for row in shown[0].rows][1] == DISTANCE[0]
 
 
 def test_a_flight_that_the_run_cuts_off_heads_the_answer_with_its_apex():
