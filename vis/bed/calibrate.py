@@ -7,7 +7,7 @@ from pathlib import Path
 from matplotlib.axes import Axes
 from matplotlib.patches import Patch
 
-from rigid.intervals import half_of
+from rigid.intervals import NORMAL, half_of
 from vis.bed.tests import cut_profiles, flank_lines, quoted, thicknesses
 from vis.page.answer import MOST_ROWS
 from vis.page.page import Block, Section, Tile, code, text
@@ -154,7 +154,7 @@ def _slopes(report: Report) -> list[Block]:
     def draw(axis: Axes, test: Result, x: Array, thickness: Array, standing: Array | None) -> str:
         axis.plot(x, thickness, color=BED, marker=".", ls="none")
         flank_lines(axis, test, start=0.5 * test["slot"], period=test["size"][0], colour=MODEL)
-        return f"seed {test['seed']}: {test['angle']:.1f} ± {test['error']:.1f}°"
+        return f"seed {test['seed']}: {test['angle']:.1f} ± {NORMAL * test['error']:.1f}°"
 
     return thicknesses(report, [test for test in _checked(report.result) if test["state"] == "drained"], draw, "slopes")
 
