@@ -6,7 +6,10 @@ from rigid import Tumbler, escape_speed, find_platform, flight, impulsive_launch
 
 gravity, radius, distance = 1e-3, 300.0, 5.0  # [m/s2], [m], [m]
 robot = find_platform("hedgehog")
-tumbler = Tumbler(mass=robot.mass, inertia=robot.moment(), spike_length=robot.stance().spike_length, gravity=gravity)
+stance = robot.stance()
+tumbler = Tumbler(
+    mass=robot.mass, inertia=robot.moment(), spike_length=stance.spike_length, lean=stance.lean, gravity=gravity
+)
 
 unit = impulsive_launch(tumbler, 1.0)  # by an angular momentum of 1 N m s: the speed is in proportion to it
 speed = launch_speed_for(distance, unit.angle, gravity=gravity, radius=radius)

@@ -50,13 +50,16 @@ _LARGEST = 1e100
 
 @dataclass(frozen=True, kw_only=True)
 class Tumbler(Coulomb):
-    """The numbers of the planar model that a launch depends on. Raises ValueError for those that cannot be."""
+    """The numbers of the planar model that a launch depends on. Raises ValueError for those that cannot be.
+
+    ``lean``: without it a platform of eight rows is meant (Hedgehog), 22.5 degrees, whatever its mass and length. Of
+    another one give ``platform.stance().lean``; of a cube it is 45 degrees. A `Launch` states which was taken.
+    """
 
     mass: float  # m [kg]
     inertia: float  # J, without J_w [kg m2]
     spike_length: float  # l [m]
     lean: float = math.pi / 8  # Angle from the vertical of the line from the tips ahead to the centre, at rest [rad]
-    """pi / 8 is of eight rows (Hedgehog). Of another platform give ``platform.stance().lean`` (cube: pi / 4)."""
     gravity: float = 0.0  # The weight on the ground over `mass_y` [m/s2]: g_sim in a rig
     mu_s: float = math.inf  # Coefficient of static friction [1]; infinite: the tips never slide
     mu_d: float | None = None  # Coefficient of sliding friction [1]; None: half of mu_s
@@ -104,6 +107,7 @@ class Launch:
     slid: bool  # Whether the tips slid when it left
     rotation: float = 0.0  # How far it had turned [rad]
     time: float = 0.0  # How long after the start of the torque [s]
+    lean: float | None = None  # That of the `Tumbler` [rad]; None where another model launched it
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -131,12 +135,12 @@ def impulsive_launch(tumbler: Tumbler, momentum: float) -> Launch:
     s, c = math.sin(tumbler.lean), math.cos(tumbler.lean)
     if m * c <= tumbler.mu_s * my * s * (1 + 1e-12):
         spin = momentum / (j + m * (length * c) ** 2 + my * (length * s) ** 2)
-        return Launch(speed=length * spin, angle=tumbler.lean, spin=spin, slid=False)
+        return Launch(speed=length * spin, angle=tumbler.lean, spin=spin, slid=False, lean=tumbler.lean)
     mu = tumbler.sliding_friction
     spin = momentum / (j + my * length**2 * s * (s + mu * c))
     up = length * spin * s
     along = mu * my * up / m
-    return Launch(speed=math.hypot(up, along), angle=math.atan2(up, along), spin=spin, slid=True)
+    return Launch(speed=math.hypot(up, along), angle=math.atan2(up, along), spin=spin, slid=True, lean=tumbler.lean)
 
 
 def launch(tumbler: Tumbler, torque: float, until: float = math.inf) -> Launch | None:
@@ -273,7 +277,7 @@ class _Contact:
         slid = abs(self.slip(state)) > 1e-9 * t.spike_length * abs(omega)
         return Launch(
             speed=math.hypot(up, along), angle=math.atan2(up, along), spin=omega, slid=slid, rotation=t.lean - beta,
-            time=time,
+            time=time, lean=t.lean,
         )  # fmt: skip
 
     def _long(self, torque: float) -> float:

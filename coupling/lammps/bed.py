@@ -346,14 +346,7 @@ class LammpsBed:
     def _dumped(self) -> Vector:
         """Rows of _COLUMNS of all grains, by id, shape [grain_count, 16]."""
         self._prepare()
-        path = self._lammps.folder / "grains.txt"
-        self._lammps.tell([
-            f"write_dump all custom {path.name} {_COLUMNS} modify sort id format float %.17g"
-        ])  # fmt: skip
-        self._lammps.wait()
-        text = path.read_text(encoding="ascii")
-        rows = text[text.index("ITEM: ATOMS") :].partition("\n")[2]
-        found = np.fromstring(rows, sep=" ").reshape(-1, len(_COLUMNS.split()))
+        found = self._lammps.dump("all", _COLUMNS)
         if len(found) != self.grain_count:
             raise BedFailure(f"LAMMPS has {len(found)} grains of {self.grain_count}: the others left the box")
         return found

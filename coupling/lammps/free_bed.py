@@ -138,11 +138,7 @@ class FreeLammpsBed(LammpsBed):
 
     def _near(self) -> Vector:
         """Rows of _COLUMNS of the grains near bodies, by id, shape [grain, 16]."""
-        path = self._lammps.folder / "near.txt"
-        self._lammps.tell([f"write_dump near custom {path.name} {_COLUMNS} modify sort id format float %.17g"])
-        self._lammps.wait()
-        rows = path.read_text(encoding="ascii").partition("ITEM: ATOMS")[2].partition("\n")[2]
-        return np.array(rows.split(), dtype=float).reshape(-1, len(_COLUMNS.split()))
+        return self._lammps.dump("near", _COLUMNS)
 
     def _step(self) -> Vector:
         """One time step; force and torque on each body in it, shape [body, 6]."""

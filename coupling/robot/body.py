@@ -31,7 +31,7 @@ from rigid.spatial.quaternions import multiply
 
 from .feet import Foot, find_feet, mesh_of, refuse_missing
 from .friction import FeetFriction
-from .models import check_model, keyframe_of, load_model, refuse_lost, rises, switch_off_floors
+from .models import check_model, keyframe_of, load_model, refuse_lost, rises, switch_off_floors, travels
 
 __all__ = ["Controller", "MujocoRobot"]
 
@@ -139,6 +139,11 @@ class MujocoRobot:
     def hangs(self) -> bool:
         """Whether the world holds it: it has neither a free joint nor an upright rail at a root."""
         return not rises(self.model, self.data)
+
+    @property
+    def travels(self) -> bool:
+        """Whether its root can move along the ground: it has a free joint or a slide there that is not upright."""
+        return travels(self.model, self.data)
 
     @property
     def _static_geoms(self) -> Vector:
@@ -391,9 +396,11 @@ class MujocoRobot:
         """Of the MuJoCo bodies that can move, 0 of the others [kg], shape (body,)."""
         return np.where(self.moving, self.model.body_mass, 0.0)
 
-    def onward(self, most_steps: int = 100_000) -> tuple[float, float] | None:
-        """How a flight goes on without the ground: rise of the centre of mass from here [m], 0 where it falls, and time
-        until the lowest foot is at the surface [s].
+    def onward(self, most_steps: int = 100_000) -> tuple[float, float, Vector] | None:
+        """How a flight goes on without the ground, until the lowest foot is at the surface.
+
+        Three numbers are returned: rise of the centre of mass from here [m], 0 where it falls; time [s]; and way of the
+        centre of mass along the ground by then [m], shape (2,).
 
         MuJoCo steps a copy, with the joints' friction and the controls of now; the controller is not called. None where
         no foot comes to the surface within `most_steps`.
@@ -401,18 +408,20 @@ class MujocoRobot:
         copied = copy.copy(self)
         copied.data = copy.copy(self.data)
         copied.data.xfrc_applied[:] = 0.0
-        start, above, step = float(self.centre[2]), self.clearance, self.model.opt.timestep
+        here, above, step = np.array(self.centre), self.clearance, self.model.opt.timestep
+        start, before = float(here[2]), here
         highest = start
         for count in range(most_steps):
             self._mujoco.mj_step(self.model, copied.data)  # leaves the places of bodies as before the step
-            height, low = float(copied.centre[2]), copied.clearance
+            there, low = np.array(copied.centre), copied.clearance
+            height = float(there[2])
             if not math.isfinite(height):
                 return None
             highest = max(highest, height)
             if height < highest and low <= 0:
                 past = low / (low - above) if above > 0 else 0.0  # of the last step, where it crossed the surface in it
-                return highest - start, step * (count - past)
-            above = low
+                return highest - start, step * (count - past), (there + past * (before - there) - here)[:2]
+            above, before = low, there
         return None
 
     @property

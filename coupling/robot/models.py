@@ -13,7 +13,7 @@ from .feet import refuse_missing
 
 __all__ = [
     "LostRobotError", "actuators_of", "check_model", "examples", "find_model", "joints_of", "keyframe_of",
-    "load_model", "refuse_lost", "rises", "switch_off_floors",
+    "load_model", "refuse_lost", "rises", "switch_off_floors", "travels",
 ]  # fmt: skip
 
 EXAMPLES = Path(__file__).parent / "examples"  # NAME is in mujoco-NAME: its model, and for some a controller
@@ -104,6 +104,19 @@ def rises(model: Any, data: Any) -> list[tuple[int, float]]:
         elif rooted and model.jnt_type[joint] == int(kinds.mjJNT_SLIDE) and abs(up) > 1 - 1e-9:
             found.append((place, up))
     return found
+
+
+def travels(model: Any, data: Any) -> bool:
+    """Whether a root can move along the ground: by a free joint, or a slide that is not upright."""
+    kinds = refuse_missing().mjtJoint
+    for joint in range(model.njnt):
+        rooted = model.body_weldid[model.body_parentid[model.jnt_bodyid[joint]]] == 0
+        level = np.hypot(*data.xaxis[joint, :2]) > 1e-3
+        if model.jnt_type[joint] == int(kinds.mjJNT_FREE):
+            return True
+        if rooted and model.jnt_type[joint] == int(kinds.mjJNT_SLIDE) and level:
+            return True
+    return False
 
 
 def refuse_lost(data: Any) -> None:

@@ -188,16 +188,21 @@ def read_material(path: str | Path) -> Material:
     Raises ValueError: a file that cannot be read or has another form; an unknown or missing key; a value of the wrong
     kind or out of range. The name of a material that ships is refused too, where the numbers differ.
     """
-    stuff = _read(Path(path))
+    return _read_with_real_grain(Path(path))[0]
+
+
+def _read_with_real_grain(path: Path) -> tuple[Material, float | None]:
+    """The material in a file, as `read_material`, and its key ``real_grain`` [m]; None where it has none."""
+    stuff, real = _read(path)
     known = MATERIALS.get(stuff.name)
     if known is not None and (known != stuff or known.grain != stuff.grain):
         raise ValueError(
             f"{path}: name = {stuff.name!r} is that of a material that ships, with other numbers; give another name"
         )
-    return stuff
+    return stuff, real
 
 
-def _read(path: Path) -> Material:
+def _read(path: Path) -> tuple[Material, float | None]:
     try:
         table = tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
@@ -208,7 +213,7 @@ def _read(path: Path) -> Material:
     if found != MATERIAL_FORMAT:
         raise ValueError(f"{path}: format = {found!r}, {MATERIAL_FORMAT!r} was expected")
     table.pop("calibration", None)
-    _real_grain(path, table.pop("real_grain", None))
+    real = _real_grain(path, table.pop("real_grain", None))
     known = {one.name: one for one in fields(Material)}
     for key in table:
         if key not in known:
@@ -218,7 +223,7 @@ def _read(path: Path) -> Material:
     needed = [key for key, one in known.items() if one.default is MISSING and one.default_factory is MISSING]
     if missing := [key for key in needed if key not in table]:
         raise ValueError(f"{path}: {', '.join(missing)} must be given")
-    return Material(**{key: _of_its_kind(path, key, value) for key, value in table.items()})
+    return Material(**{key: _of_its_kind(path, key, value) for key, value in table.items()}), real
 
 
 def real_grain_of(name: str | Path) -> float | None:
@@ -228,9 +233,7 @@ def real_grain_of(name: str | Path) -> float | None:
     """
     if (known := material_of_today(str(name).lower())) in MATERIALS:
         return REAL_GRAINS.get(known)
-    read_material(name)
-    table = tomllib.loads(Path(name).read_text(encoding="utf-8"))
-    return _real_grain(Path(name), table.get("real_grain"))
+    return _read_with_real_grain(Path(name))[1]
 
 
 def _real_grain(path: Path, value: Any) -> float | None:
@@ -257,7 +260,7 @@ def _of_its_kind(path: Path, key: str, value: Any) -> Any:
     return value if key in kinds else float(value)
 
 
-MATERIALS = {stuff.name: stuff for stuff in map(_read, sorted(PRESETS.glob("*.toml")))}
+MATERIALS = {stuff.name: stuff for stuff, _ in map(_read, sorted(PRESETS.glob("*.toml")))}
 """The materials that ship, those of dem/presets (docs/materials.md)."""
 
 REAL_GRAINS = {"sand": 2e-4, "sand-weak": 2e-4}

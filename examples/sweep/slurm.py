@@ -7,6 +7,9 @@
 No SLURM was at hand: tried with dask-jobqueue 0.9.0 and stand-ins for sbatch and scancel on one machine. Queue,
 account, memory and time are yours to change. Every worker must see the same /shared under the same path, and have the
 same version of hedgebed.
+
+Other queues: take `PBSCluster`, `LSFCluster`, `SGECluster` or `HTCondorCluster` of dask_jobqueue in place of
+`SLURMCluster`, and the words of your queue in place of `--requeue`. These were not tried.
 """
 
 import signal

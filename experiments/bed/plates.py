@@ -150,7 +150,7 @@ def _test(settings: BedPlatesSettings, bed: Any, about: Json, copy: int, tell: C
     shape = _body_of(push, settings)
     speed = speed_of(settings, about["grain"], about["density"], about["gravity"])
     rows = np.array(list(_pushed(settings, bed, push, shape, speed, tell)))
-    columns = dict(zip(("way_m", "depth_m", "force_x_N", "force_y_N", "force_z_N", "measured"), rows.T, strict=True))
+    columns = dict(zip(("way_m", "depth_m", "force_x_N", "force_y_N", "force_z_N", "evaluated"), rows.T, strict=True))
     numbers = {
         "beta": push.beta, "gamma": push.gamma, "shape": push.shape, "body": push.name, "speed": speed,
         "samples": [[float(f"{value:.6g}") for value in part] for part in _binned(rows[rows[:, 5] > 0][:, 1:5])],

@@ -9,6 +9,7 @@ from experiments.penetrate.fit import spread
 from experiments.runs.types import Json
 from rigid.ground.rft import function_of
 from rigid.ground.rft_table import RFT_FORMAT, Pieces, RftTable
+from rigid.intervals import half_width
 
 from .plates_fit import Fit, fit_of, measured_force, predicted_force
 from .settings import say
@@ -156,8 +157,10 @@ def _warnings(settings: BedPlatesSettings, runs: list[Json], fit: Fit, others: l
     return said
 
 
-def _with_std(value: float, std: float | None) -> str:
-    return f"{value:.3g}" if std is None else f"{value:.3g} ± {std:.2g}"
+def _with_error(row: Json, axis: str) -> str:
+    """The mean force over the beds with half of its 95 % interval."""
+    half = half_width(row[f"std_{axis}"], row["beds"])
+    return f"{row[f'force_{axis}']:.3g}" + ("" if half is None else f" ± {half:.2g}")
 
 
 _PLATE_COLUMNS = {
@@ -166,8 +169,8 @@ _PLATE_COLUMNS = {
 }
 _SHAPE_COLUMNS = {"shape": lambda row: str(row["body"]), "gamma [degrees]": lambda row: f"{row['gamma']:g}"}
 _COLUMNS = {
-    "force x [N]": lambda row: _with_std(row["force_x"], row["std_x"]),
-    "force z [N]": lambda row: _with_std(row["force_z"], row["std_z"]),
+    "force x [N]": lambda row: _with_error(row, "x"),
+    "force z [N]": lambda row: _with_error(row, "z"),
     "predicted x": lambda row: f"{row['law_x']:.3g}",
     "predicted z": lambda row: f"{row['law_z']:.3g}",
     "difference": lambda row: f"{100 * row['error']:.0f} %",

@@ -6,6 +6,7 @@ from typing import Any
 
 from dem.measure.repose import angle_of_repose, check_width
 from experiments.runs.types import Json
+from rigid.intervals import NORMAL
 
 from .test_settings import BedReposeSettings
 from .tests import Tested, bed_test, check_bed, of_beds, picked, quantity, table
@@ -36,7 +37,7 @@ def _result(_: BedReposeSettings, runs: list[Json]) -> Json:
     of = partial(quantity, runs)
 
     def slope(flank: Json) -> str:
-        return f"{flank['angle']:.1f} ± {flank['error']:.1f}"
+        return f"{flank['angle']:.1f} ± {NORMAL * flank['error']:.1f}"
 
     fitted = "drained; mean of two slopes a run, fitted from three diameters to four fifths of the crest's height"
     quantities = {
@@ -47,7 +48,7 @@ def _result(_: BedReposeSettings, runs: list[Json]) -> Json:
     columns = {
         "run": lambda run: run["id"],
         "angle [deg]": lambda run: f"{run['angle']:.1f}",
-        "error": lambda run: f"{run['error']:.1f}",
+        "± 95 %": lambda run: f"{NORMAL * run['error']:.1f}",
         "right slope": lambda run: slope(run["flanks"][0]),
         "left slope": lambda run: slope(run["flanks"][1]),
         "crest [d]": lambda run: f"{run['crest'] / run['grain']:.1f}",

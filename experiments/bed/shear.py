@@ -25,13 +25,14 @@ from experiments.runs.progress import Progress
 from experiments.runs.result import Result, quantity
 from experiments.runs.types import Json
 from experiments.runs.whole_runs import computed_run
+from rigid.intervals import student
 
 from .peaks import LEAST_PEAK, peak_over_noise, without_peak
 from .settings import say
 from .test_settings import BedShearSettings
 from .tests import picked, table
 
-__all__ = ["Strength", "check", "fit_line", "resume", "run", "strength_of"]
+__all__ = ["PARTS", "Strength", "check", "fit_line", "resume", "run", "strength_of"]
 
 _SMOOTH = 0.5
 """Way of the lid over which the peak's stress is averaged [mean diameters]."""
@@ -40,7 +41,7 @@ _BAND = 3.0
 _COLUMNS = {"way": "way_m", "height": "height_m", "shear": "shear_Pa", "normal": "normal_Pa"}
 """Of the series, by what a run calls them."""
 _NUMBERS = ("pressure", "speed", "inertial_number", "packing_fraction", "overburden")
-_PARTS = 5
+PARTS = 5
 """Parts of the second half of the way, whose scatter gives the standard error."""
 
 
@@ -68,13 +69,13 @@ def strength_of(run: Shearing, grain: float) -> Strength:
     kernel = np.ones(count) / count
     smooth = np.convolve(run.shear, kernel, "valid") / np.convolve(run.normal, kernel, "valid")
     top = int(np.argmax(smooth))
-    shear, pressed = (np.array_split(values[len(run.way) // 2 :], _PARTS) for values in (run.shear, run.normal))
+    shear, pressed = (np.array_split(values[len(run.way) // 2 :], PARTS) for values in (run.shear, run.normal))
     parts = [part.mean() / other.mean() for part, other in zip(shear, pressed, strict=True)]
     return Strength(
         normal=normal,
         peak=normal * float(smooth[top]),
         critical=normal * float(np.mean(parts)),
-        critical_error=normal * float(np.std(parts, ddof=1)) / math.sqrt(_PARTS),
+        critical_error=normal * float(np.std(parts, ddof=1)) / math.sqrt(PARTS),
         peak_way=float(run.way[min(top + count // 2, len(run.way) - 1)]),
         peak_over_noise=peak_over_noise(smooth),
     )
@@ -152,7 +153,7 @@ def _result(settings: BedShearSettings, runs: list[Shearing], grain: float, reci
         "peak [Pa]": lambda row: f"{row[0].peak:.0f}",
         "at [d]": lambda row: f"{row[0].peak_way / grain:.1f}",
         "critical [Pa]": lambda row: f"{row[0].critical:.0f}",
-        "± [Pa]": lambda row: f"{row[0].critical_error:.0f}",
+        "± 95 % [Pa]": lambda row: f"{student(PARTS - 1) * row[0].critical_error:.0f}",
         "peak ratio": lambda row: f"{row[0].peak / row[0].normal:.3f}",
         "critical ratio": lambda row: f"{row[0].critical / row[0].normal:.3f}",
         "dilates [d]": lambda row: f"{row[1].height[-1] / grain:.2f}",

@@ -230,10 +230,11 @@ def quantity(runs: Sequence[Run], of: Of, unit: str, note: str, *, error: Of | N
 
 
 def of_beds(runs: Sequence[Run], count: str) -> Json:
-    """The quantities that every test has last; `count`: which grains were counted."""
+    """The quantities that every test has last; `count`: which grains were counted. Copies of a bed count once."""
+    beds = list({run["id"].partition("-")[0]: run for run in reversed(runs)}.values())
     return {
-        "packing_fraction": quantity(runs, "packing_fraction", "1", "of the bed before"),
-        "grain_count": quantity(runs, "grain_count", "1", count),
+        "packing_fraction": quantity(beds, "packing_fraction", "1", "of the bed before"),
+        "grain_count": quantity(beds, "grain_count", "1", count),
         "max_overlap": quantity(runs, "max_overlap", "1", "over diameter"),
     }
 

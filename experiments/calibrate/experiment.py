@@ -252,7 +252,7 @@ def _of_bed(work: _Work, target: Target, stuff: Material) -> tuple[float, float 
             kept["reason"] = str(failure)
         work.folder.mark_done(about, kept)
     if kept["value"] is None:
-        work.progress.message(f"{target.name} could not be measured: {kept['reason']}")
+        work.progress.message(f"{target.name} could not be simulated: {kept['reason']}")
         return None
     return share * kept["value"], None
 

@@ -26,7 +26,7 @@ _CURVE = 41
 Values = Mapping[str, float]
 """Of the parameters, by name."""
 Measured = tuple[float, float | None] | None
-"""Value and standard error of a figure; None where it could not be measured."""
+"""Value and standard error of a figure; None where no test of a bed gives it."""
 _UNSOURCED = ("name", "cohesion", "grain", "tangential")
 
 
@@ -68,7 +68,7 @@ def calibration_result(
     ]
     warnings = _warnings(settings, fit)
     for target, entry in zip(targets, entries, strict=True):
-        got, error, verdict = entry["measured"], entry["error"], entry["verdict"]
+        got, error, verdict = entry["simulated"], entry["error"], entry["verdict"]
         note = f"{verdict}; wanted {target.value:g} ± {target.tolerance:g}"
         quantities[target.name] = quantity(got, target.unit, note, std=error) | _freedom(entry)
         if verdict != "met":
@@ -108,7 +108,7 @@ def _entry(target: Target, found: Measured, fit: Fit, reach: tuple[float, float]
     off = math.inf if got is None else abs(got - target.value)
     verdict = "met" if off <= target.tolerance else "not met"
     if got is None:
-        verdict = "not measured"
+        verdict = "no value"
     elif target.tolerance < off <= target.tolerance + half:
         verdict = "not met; the tests' noise does not exclude it"
     return {
@@ -118,7 +118,7 @@ def _entry(target: Target, found: Measured, fit: Fit, reach: tuple[float, float]
         "plane": target.plane if "friction_angle" in target.figure or target.plane == "mohr" else None,
         "state": target.state or None,
         "fitted": target.fit,
-        "measured": got,
+        "simulated": got,
         **known,
         "expected": fit.response.get(target.name),
         "expected_std": fit.response_std.get(target.name),
@@ -158,11 +158,11 @@ def _no_peak(target: Target, found: Measured, done: Simulated, best: Values) -> 
 
 
 def _unmet(target: Target, entry: Json) -> str:
-    value, verdict, reach = (entry[key] for key in ("measured", "verdict", "reach"))
+    value, verdict, reach = (entry[key] for key in ("simulated", "verdict", "reach"))
     half = _half(entry)
     wanted = f"{target.value:g} ± {target.tolerance:g} {target.unit} was wanted"
     if value is None:
-        return f"{target.name} could not be measured: {wanted}"
+        return f"{target.name} could not be simulated: {wanted}"
     said = f"{target.name} = {value:.4g}{'' if half is None else f' ± {half:.2g} (95 %)'} where {wanted}: {verdict}"
     if reach is not None and verdict.startswith("not met") and not reach[0] <= target.value <= reach[1]:
         said += f"; within the parameters' ranges it goes from {reach[0]:.3g} to {reach[1]:.3g}"
@@ -237,7 +237,7 @@ def _half(entry: Json) -> float | None:
 def _simulated(entry: Json) -> str:
     half = _half(entry)
     error = "" if half is None else f" ± {half:.2g}"
-    return "-" if entry["measured"] is None else f"{entry['measured']:.4g}{error}"
+    return "-" if entry["simulated"] is None else f"{entry['simulated']:.4g}{error}"
 
 
 _FIGURES: dict[str, Callable[[Json], str]] = {
@@ -282,7 +282,7 @@ def material_toml(stuff: Material, settings: CalibrateSettings, fit: Fit, figure
         *_pairs({"version": __version__, "grain": settings.grain} | stds),
     ]
     for entry in figures:
-        digits = {"measured": ".5g", "error": ".2g"}
+        digits = {"simulated": ".5g", "error": ".2g"}
         rounded = {key: None if entry[key] is None else float(f"{entry[key]:{form}}") for key, form in digits.items()}
         found = {key: (entry | rounded)[key] for key in ("wanted", "tolerance", *digits, "verdict", "source")}
         if "no_peak" in entry:

@@ -167,6 +167,8 @@ _NARROW = 24
 """Characters of a first column that is not broken into lines."""
 _HEAD = 9
 """Characters of a heading that stays on one line above narrower cells."""
+_GAP = 2
+"""Blanks between two columns."""
 
 
 def _unit(unit: str, value: Any, std: Any = None) -> str:
@@ -200,17 +202,41 @@ def _show_headline(headline: Headline, console: Console) -> None:
 
 
 def _show_tables(tables: Sequence[Mapping[str, Any]], console: Console) -> None:
-    """Tables of a result under their titles."""
+    """Tables of a result under their titles. One of numbers that is too wide for the screen is shown in parts."""
     for listed in tables:
         if listed["title"]:
             console.print(listed["title"], markup=False, style="italic")
-        shown = Table(box=None, pad_edge=False)
-        for place, heading in enumerate(listed["head"]):
-            narrow = all(len(str(row[place])) <= _NARROW for row in listed["rows"])
-            shown.add_column(heading, no_wrap=place == 0 and narrow)
-        for row in listed["rows"]:
-            shown.add_row(*(Text(str(cell)) for cell in row))
-        console.print(shown, markup=False)
+        for places in _parts(listed, console.width):
+            shown = Table(box=None, pad_edge=False)
+            for place in places:
+                narrow = all(len(str(row[place])) <= _NARROW for row in listed["rows"])
+                shown.add_column(listed["head"][place], no_wrap=place == 0 and narrow, overflow="fold")
+            for row in listed["rows"]:
+                shown.add_row(*(Text(str(row[place])) for place in places))
+            console.print(shown, markup=False)
+
+
+def _parts(listed: Mapping[str, Any], width: int) -> list[list[int]]:
+    """The columns of each part of a table; every part has the names, and the units where they are the second column.
+
+    One part where the table is no wider than ``width`` characters, or has sentences in it.
+    """
+    columns = range(len(listed["head"]))
+    cells = [[str(row[place]) for row in listed["rows"]] for place in columns]
+    widths = [max(map(len, (str(listed["head"][place]), *cells[place]))) for place in columns]
+    fixed = [place for place in columns if place == 0 or (place == 1 and listed["head"][1] == "unit")]
+    free = [place for place in columns if place not in fixed]
+    whole = sum(widths) + _GAP * (len(widths) - 1)
+    if whole <= width or len(free) < 2 or max(widths[place] for place in free) > _NARROW:
+        return [list(columns)]
+    taken = min(widths[0], _NARROW) + sum(widths[place] for place in fixed[1:])
+    room = width - taken - _GAP * (len(fixed) - 1)
+    parts: list[list[int]] = [[]]
+    for place in free:
+        if parts[-1] and sum(widths[one] + _GAP for one in [*parts[-1], place]) > room:
+            parts.append([])
+        parts[-1].append(place)
+    return [[*fixed, *part] for part in parts]
 
 
 def _show_all(result: Mapping[str, Any], console: Console) -> None:

@@ -74,6 +74,8 @@ class ConvergeSettings(PenetrateSettings):
         for key in _NOT_HERE:
             if getattr(self, key) is not None:
                 raise ValueError(say("not_here", key=key, value=getattr(self, key)))
+        if not self.set_down:
+            raise ValueError(say("needs_set_down"))
         if self.ground != "bed":
             raise ValueError(f"ground = {self.ground!r} has no grains to be made finer: ground = 'bed' is accepted")
         if self.life_grain > self.finest:

@@ -44,11 +44,13 @@ def resolution_advice(
     depth: float,
     seconds: float | None = None,
     cohesive: bool = False,
+    flat: bool = False,
 ) -> Iterator[str]:
     """One sentence for each reason why a bed is too small or too coarse; none for a good bed. Lengths in m.
 
     `tip`: its diameter; `size`: both widths and the depth of the bed; `depth`: how deep the tip is driven; `seconds`:
-    expected time of the runs; `cohesive`: whether the grains stick, for which `COARSE` does not hold.
+    expected time of the runs; `cohesive`: whether the grains stick, for which `COARSE` does not hold; `flat`: whether
+    the tip is a plate, for which it was not seen (docs/notes/validation.md, plates-in-sand).
     """
     width, height = min(size[:2]), size[2]
     if width < ENOUGH_TIPS * tip * (1 - 1e-9):
@@ -65,8 +67,10 @@ def resolution_advice(
         cost = costs(times_as_long(size, grain, wanted=size, wanted_grain=finer), seconds)
         counts, ratios = zip(*COARSE, strict=True)
         told = {"across": found, "finer": finer, "enough": ENOUGH_ACROSS, "cost": cost}
+        of_ball = say("of_ball_not_plate" if flat else "of_ball")
         percent = 100 * (float(np.interp(found, counts, ratios)) - 1)
-        yield say("coarse_sticky_bed", **told) if cohesive else say("coarse_bed", percent=percent, **told)
+        told |= {} if cohesive else {"percent": percent, "of_ball": of_ball}
+        yield say("coarse_sticky_bed" if cohesive else "coarse_bed", **told)
 
 
 def _clock(seconds: float) -> str:

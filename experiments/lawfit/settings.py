@@ -166,6 +166,8 @@ class LawFitSettings(PenetrateSettings):
         if self.ground != "bed" or self.bed is not None or self.model is not None:
             key = next(key for key in ("bed", "model", "ground") if getattr(self, key) not in (None, "bed"))
             raise ValueError(say("not_here", key=key, value=getattr(self, key)))
+        if not self.set_down:
+            raise ValueError(say("needs_set_down"))
         if self.runs:
             self._refuse_settings_of_runs()
         return self

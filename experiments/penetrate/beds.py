@@ -44,7 +44,7 @@ def resolution_of(settings: PenetrateSettings) -> dict[str, Any]:
     """What `resolution_advice` asks of a bed and its tip."""
     return {
         "tip": settings.tip_diameter, "grain": settings.grain, "depth": settings.depth, "size": settings.bed_size,
-        "cohesive": find_material(settings).cohesion != "none",
+        "cohesive": find_material(settings).cohesion != "none", "flat": settings.tip == "flat",
     }  # fmt: skip
 
 
@@ -166,7 +166,7 @@ def _softness(settings: PenetrateSettings) -> Softening:
     ]
     heavier = first_gravity(settings) / settings.gravity  # while it is prepared
     depth, pressure = settings.depth, 0.0
-    if not sinks_away(settings):  # it is dropped and set down; no bed presses with more than it bears
+    if settings.loaded and not sinks_away(settings):  # no bed presses with more than it bears
         depth = min(floor, max(settings.depth, *drops)) if drops else settings.depth
         pressure = min(settings.weight, stiffness * floor + bears.held) / area
     peaks = _FLAT if settings.tip == "flat" else 1.0

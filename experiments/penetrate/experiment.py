@@ -97,8 +97,9 @@ def compute(settings: PenetrateSettings, folder: RunFolder, progress: Progress) 
         progress.message(softening_note(settings, softening))
         any_drops = any(unit.kind == "drop" for unit in units)
         dropped = f", a dropped spike moves {settings.mass:.4g} kg" if any_drops else ""
-        progress.message(f"the load is {settings.weight:.4g} N{dropped}")
-        if beds.sinks_away(settings):
+        if settings.loaded:
+            progress.message(f"the load is {settings.weight:.4g} N{dropped}")
+        if settings.loaded and beds.sinks_away(settings):
             rests = beds.expected_bearing(settings).depth(settings.weight)
             progress.message(say("only_driven", s=settings, rests=rests))
         plan = PenetratePlan(

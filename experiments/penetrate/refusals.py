@@ -73,7 +73,7 @@ def check(settings: PenetrateSettings) -> None:
 
 def _check_reach(settings: PenetrateSettings) -> None:
     """Refuse what would end near the floor, but for a load that no depth of the foot bears: that is an answer."""
-    if beds.sinks_away(settings):
+    if not settings.loaded or beds.sinks_away(settings):
         return
     bears, floor = beds.expected_bearing(settings), deepest(settings)
     deeper = f"{floor:.3g} m, one tip's diameter above the floor"

@@ -44,7 +44,7 @@ from .sure import (
 )
 from .units import Unit
 
-__all__ = ["answer", "how_sure", "made_units", "sinkage_interval"]
+__all__ = ["answer", "how_sure", "made_units", "real_grain", "sinkage_interval"]
 
 _BESIDE = "jsc-1a-loose-cut"
 """The material to try where grains without cohesion do not bear."""
@@ -63,6 +63,8 @@ def answer(findings: Findings, material: Any) -> Json | None:
     """
     settings = findings.settings
     stood = findings.of("set_down")
+    if not (settings.set_down or (settings.dropped_speeds and beds.sinks_away(settings))):
+        return None  # nobody asked
     if stood and not all(run.ended == "max_depth" for run in stood):
         rests = any(depth is not None for depth in findings.sinkages(findings.beds))
         return _stuck(settings, material) if rests and settings.tip == "flat" else None
@@ -132,8 +134,7 @@ def _by_cohesion(settings: PenetrateSettings, material: Any) -> tuple[Json, Json
 
     Two estimates, and the range holds both: the K expected of the material, times `UNSURE` at the lower end and over it
     at the upper, and Terzaghi's formula over the angles of the material. The cohesion is taken at the ends of its 95 %
-    interval. "depth_least_cohesion" has both estimates at the least cohesion. Returns the numbers, and what the
-    sentences on them take, with "verdict": holds, sinks or open.
+    interval. Returns the numbers, and what the sentences on them take, with "verdict": holds, sinks or open.
     """
     found = cohesion_in_95(material)
     assert found is not None
@@ -148,11 +149,10 @@ def _by_cohesion(settings: PenetrateSettings, material: Any) -> tuple[Json, Json
     )
     by_k = (hard * shares[1], soft * shares[1])
     low, high = min(hard * shares[0], strong[0]), max(by_k[1], weak[1])
-    least_low = min(by_k[0], weak[0])
     numbers: Json = {
         "material": material.name, "cohesion": found.value, "cohesion_95": [found.least, found.most],
         "friction_angles": list(angles), "cohesions_enough": needs, "depth_range": [low, high],
-        "depth_least_cohesion": [least_low, high], "depth_expected_k": list(by_k), "depth_formula": list(weak),
+        "depth_expected_k": list(by_k), "depth_formula": list(weak),
         "stiffness": stiffness,
     }  # fmt: skip
     told: Json = {
@@ -166,7 +166,7 @@ def _by_cohesion(settings: PenetrateSettings, material: Any) -> tuple[Json, Json
     return numbers, told | {"branches": say("branches", **told)}
 
 
-def _real_grain(settings: PenetrateSettings, material: Any) -> float:
+def real_grain(settings: PenetrateSettings, material: Any) -> float:
     """Mean diameter of the real grains [m]; 0 where the material does not state it, which makes errors wider."""
     if material.name in REAL_GRAINS:
         return REAL_GRAINS[material.name]
@@ -178,7 +178,7 @@ def sinkage_interval(findings: Findings, material: Any) -> Interval | None:
     settings = findings.settings
     return interval_of_sinkage(
         findings.sinkages(findings.beds), tip=settings.tip, grain=settings.grain,
-        real=_real_grain(settings, material), cohesive=material.cohesion != "none",
+        real=real_grain(settings, material), cohesive=material.cohesion != "none",
     )  # fmt: skip
 
 
@@ -191,7 +191,7 @@ def how_sure(findings: Findings, material: Any, rest: Json | None) -> Json:
     beds_k = [fit.stiffness for fit in findings.seed_fits.values()] if findings.beds_separate else []
     stiffness = None if not findings.fit.separates else interval_of_stiffness(
         findings.fit.stiffness, beds_k, tip=settings.tip,
-        grain=settings.grain, real=_real_grain(settings, material), diameter=settings.tip_diameter,
+        grain=settings.grain, real=real_grain(settings, material), diameter=settings.tip_diameter,
         cohesive=material.cohesion != "none",
     )  # fmt: skip
     found = {

@@ -22,7 +22,7 @@ from .departures import departures, with_half
 from .findings import BedFacts, Findings, bed_entry, bed_quantities, drop_note
 from .fit import MOST_CORRELATED
 from .reference import compare_with, read_reference
-from .rest import answer, how_sure, sinkage_interval
+from .rest import answer, how_sure, real_grain, sinkage_interval
 from .settings import PenetrateSettings, say
 from .similarity import fast_for_gravity, pace_of, similarity_of
 from .sure import ends_of, in_words
@@ -106,6 +106,7 @@ def conclude(
         "departures": departures,
         "bed": bed_entry(facts, settings, softening) | {
             "material": material.name, "rolling_friction": material.rolling_friction, "stiffened": stiffened,
+            "real_grain": real_grain(settings, material) or None,
             **({"missing": {str(seed): why for seed, why in missing.items()}} if missing else {}),
         },
         "spike": asdict(make_spike(settings)) | {"load": settings.weight},
@@ -222,7 +223,7 @@ def _not_separated(findings: Findings) -> Iterator[str]:
     conditions = {unit.condition for unit in findings.units if unit.id in fit.runs}
     own = [one.correlation for one in findings.seed_fits.values() if one.correlation is not None]
     each = len(own) >= 2 and not findings.beds_separate
-    needed = "" if findings.of("set_down") else say("rest_needs_k")
+    needed = "" if findings.of("set_down") or not findings.settings.set_down else say("rest_needs_k")
     if len(conditions) < LEAST_CONDITIONS or abs(fit.correlation or 0.0) > MOST_CORRELATED:
         shown = "unknown" if fit.correlation is None else f"{fit.correlation:.2f}"
         listed = ", ".join(f"{kind} at {v:g} m/s" for kind, v in sorted(conditions))
@@ -238,7 +239,7 @@ def softening_note(settings: PenetrateSettings, softening: Softening) -> str:
         "a driven run": (*settings.speeds, *settings.other_speeds[: len(settings.seeds) - 1]),
         "the pull-out": (settings.retreat_speed,),
         "a drop": (*settings.drop_speeds, *settings.other_drop_speeds),
-        "the lowering": (settings.lowering_speed,),
+        "the lowering": (settings.lowering_speed,) if settings.set_down else (),
     }
     whose = next((name for name, speeds in fastest.items() if softening.speed in speeds), "the fastest run")
     return say("softened", softening=softening, percent=100 * settings.max_overlap, whose=whose)

@@ -102,14 +102,19 @@ class PenetrateSettings(StrictSettings):
     platform in the rig, (m + m_b) / 4, is 2.63 kg. A free drop in a laboratory has load = mass x g."""
 
     # What is done with it
-    speeds: tuple[Positive, ...] = Field((0.1, 0.2, 0.4), min_length=1, description="Speeds of pushes [m/s].")
-    depth: Positive = Field(0.012, description="Depth of pushes [m].")
+    speeds: tuple[Positive, ...] = Field((0.1, 0.2, 0.4), min_length=1)
+    """Speeds of pushes [m/s]. The default is for a tip of 12 mm; for a similar push of another tip multiply it by the
+    square root of tip_diameter / 12 mm."""
+    depth: Positive = 0.012
+    """Depth of pushes [m]. The default is for a tip of 12 mm; for a similar push of another tip multiply it by
+    tip_diameter / 12 mm."""
     hold: NotNegative = Field(0.01, description="Time for which a pushed spike is held at depth [s].")
     retreat_speed: Positive = Field(0.4, description="Speed of withdrawal [m/s].")
     drop_speeds: tuple[Positive, ...] = (0.1, 0.15, 0.2)
     """Speeds of drops at the surface [m/s]; none: no drops on any bed, unless other_drop_speeds is given."""
     after_stop: Positive = Field(0.03, description="Time for which a drop is followed after its first stop [s].")
     drop_time: Positive = Field(0.8, description="Longest time of a drop [s].")
+    set_down: bool = Field(True, description="Set the load down on each bed; without it no sinkage is computed.")
     lowering_speed: Positive = Field(0.1, description="Speed at which a spike is set down [m/s].")
     rest_time: Positive = Field(0.04, description="Time for which a spike must stand still to count as at rest [s].")
     other_speeds: tuple[Positive, ...] = (0.4,)
@@ -238,12 +243,13 @@ class PenetrateSettings(StrictSettings):
                 least = 2 * math.degrees(math.atan(0.5 * self.grain / self.depth))
                 return say("cone_thin", s=self, there=there, least=least)
         # A drop or a set-down is ended one tip's diameter above the floor.
-        reach = max(self.depth, self.bed_size[2] - self.tip_diameter)
+        reach = max(self.depth, self.bed_size[2] - self.tip_diameter) if self.loaded else self.depth
         if self.foot < reach * (1 - 1e-9):
-            what = "drop" if self.drop_speeds or (len(self.seeds) > 1 and self.other_drop_speeds) else "set_down"
-            return say(
-                "shaft_short", s=self, what=say(f"reached_by_{what}"), reach=reach, least=reach - self.tip_height
-            )
+            least = reach - self.tip_height
+            if not self.loaded:
+                return say("shaft_short_of_depth", s=self, least=least)
+            what = say("reached_by_drop" if self.dropped_speeds else "reached_by_set_down")
+            return say("shaft_short", s=self, what=what, reach=reach, least=least)
         return None
 
     def _bed(self) -> str | None:
@@ -354,7 +360,8 @@ class PenetrateSettings(StrictSettings):
         """The key and the value of the largest speed of these runs [m/s]."""
         keys = ("speeds", "drop_speeds", "other_speeds", "other_drop_speeds")
         every = [(key, speed) for key in keys for speed in self.used(key)]
-        every += [("retreat_speed", self.retreat_speed), ("lowering_speed", self.lowering_speed)]
+        every += [("retreat_speed", self.retreat_speed)]
+        every += [("lowering_speed", self.lowering_speed)] if self.set_down else []
         return max(every, key=lambda pair: pair[1])
 
     def used(self, key: str) -> Any:
@@ -370,6 +377,11 @@ class PenetrateSettings(StrictSettings):
     def dropped_speeds(self) -> tuple[float, ...]:
         """Speeds of all drops [m/s]."""
         return (*self.drop_speeds, *self.used("other_drop_speeds"))
+
+    @property
+    def loaded(self) -> bool:
+        """Whether the load rests on the spike in any run: it is set down or dropped."""
+        return self.set_down or bool(self.dropped_speeds)
 
     @property
     def body_words(self) -> str:

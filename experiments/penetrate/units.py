@@ -63,13 +63,14 @@ class Unit:
 
 def plan_units(settings: PenetrateSettings) -> list[Unit]:
     """All runs, seed by seed: everything on the first seed, what the settings say on the others. On the law of a model
-    nothing is set down unless `load` is given."""
+    nothing is set down unless `load` is given; nowhere without `set_down`."""
     units = []
     for index, seed in enumerate(settings.seeds):
         first, others = (settings.speeds, settings.drop_speeds), (settings.other_speeds, settings.other_drop_speeds)
         speeds, drops = first if index == 0 else others
         units += [Unit(seed, "driven", speed) for speed in speeds] + [Unit(seed, "drop", speed) for speed in drops]
-        if settings.ground != "spring-damper" or settings.load is not None:  # a model's law: what was asked for only
+        asked = settings.ground != "spring-damper" or settings.load is not None  # on a model's law
+        if settings.set_down and asked:
             units.append(Unit(seed, "set_down", settings.lowering_speed))
     return units
 

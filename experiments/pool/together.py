@@ -62,6 +62,12 @@ class Where:
         elif (self.workers or 1) > 1:
             required("distributed", f"workers = {self.workers}", without="workers = 1 needs nothing more")
 
+    def on_all_cores(self) -> "Where":
+        """The same; where it is left open, all cores here, or one process where dask is not there."""
+        if self.scheduler is not None or self.workers is not None:
+            return self
+        return Where(workers=1 if find_spec("distributed") is None else cores_there())
+
     def processes(self, costs: Sequence[float]) -> int:
         """How many processes here compute runs of these reckoned costs [s]: at least 1, at most one for each run.
 

@@ -13,7 +13,7 @@ from experiments.runs.given import keep_given, kept_copy
 from experiments.runs.progress import Progress
 from experiments.runs.result import Result, quantity
 from experiments.runs.types import Json
-from experiments.runs.whole_runs import keeping_status, publish
+from experiments.runs.whole_runs import keeping_status, publish, report_called
 from vis.page.numbers import foldable
 from vis.page.numbers import quantity as in_words_of
 from vis.robot.answer import BALLISTIC
@@ -23,7 +23,7 @@ from .forms import NO_FORMS, Forms, expected_words, with_grains
 from .on_grains import RobotOnBed
 from .plan import CONTROLLER, MODEL, RobotPlan
 from .settings import RobotSettings
-from .sure import ANSWER, answer_of, entry, in_words
+from .sure import ANSWER, DISTANCE, answer_of, entry, in_words
 
 __all__ = ["carry_out_beds", "over_beds"]
 
@@ -41,7 +41,10 @@ def carry_out_beds(settings: RobotSettings, plan: RobotPlan, folder: RunFolder, 
     copies of model and controller from `folder`. Raises as `RobotOnBed.carry_out`.
     """
     runs = {seed: _OneOfSeveral(settings.of_bed(seed), plan) for seed in settings.seeds}
-    progress.plan({name: cost for run in runs.values() for name, cost in run.costs.items()}, seconds={"report": 5.0})
+    progress.plan(
+        {name: cost for run in runs.values() for name, cost in run.costs.items()},
+        seconds={run.report_stage: run.report_seconds for run in runs.values()} | {"report": 5.0},
+    )
     results: list[Mapping[str, Any]] = []
     before: RobotOnBed | None = None
     for place, (seed, run) in enumerate(runs.items(), 1):
@@ -52,7 +55,7 @@ def carry_out_beds(settings: RobotSettings, plan: RobotPlan, folder: RunFolder, 
         else:
             progress.message(say("bed_begins", **words, folder=home.path))
             _copy_given(folder.path, home.path)
-            with keeping_status(home):
+            with keeping_status(home), report_called(run.report_stage):
                 run.take_laws_of(before)
                 run.carry_out(home, progress)
             before = run
@@ -69,6 +72,7 @@ class _OneOfSeveral(RobotOnBed):
         super().__init__(settings, replace(plan, settings=settings))
         names = (f"{name}, seed {settings.seed}" for name in (self.stage, self.bed_stage, self.lowering_stage))
         self.stage, self.bed_stage, self.lowering_stage = names
+        self.report_stage = f"report, seed {settings.seed}"
 
     def take_laws_of(self, other: RobotOnBed | None) -> None:
         """Take the runs on surface laws of another bed, where there is one: they do not depend on the bed."""
@@ -95,7 +99,7 @@ def over_beds(seeds: Sequence[int], results: Sequence[Mapping[str, Any]]) -> Res
         for result, hop in zip(results, hops, strict=True)
     ]
     sure: Json = {}
-    for name in ANSWER:
+    for name in (name for name in answers[0] if all(name in answer for answer in answers)):
         found = interval_of([answer[name] for answer in answers])
         assert found is not None and found.half is not None
         sure[name] = entry(name, found.mean, found.mean - found.half, found.mean + found.half)
@@ -177,11 +181,14 @@ def _of_its_own(result: Mapping[str, Any]) -> Json:
 
 def _each(seeds: Sequence[int], results: Sequence[Mapping[str, Any]], answers: Sequence[Mapping[str, float]]) -> Json:
     """A table with the answer of each bed."""
+    along = {DISTANCE: "m"} if all(DISTANCE in answer for answer in answers) else {}
+    units = {**ANSWER, **along}
     rows = [
-        [str(seed), *(in_words_of({"value": answer[name], "std": 0.0, "unit": unit}) for name, unit in ANSWER.items())]
+        [str(seed), *(in_words_of({"value": answer[name], "std": 0.0, "unit": unit}) for name, unit in units.items())]
         for seed, answer in zip(seeds, answers, strict=True)
     ]
     head = ["seed", "rise", "longest flight", "clearance", "sinkage", "largest force"]
+    head += ["distance of the hop"] if along else []
     return {"title": say("each_bed"), "head": head, "rows": rows}
 
 

@@ -6,6 +6,7 @@ with the speed v upwards rises by v^2 / 2 g and is back at its height after 2 v 
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +18,8 @@ from . import say
 from .settings import RobotSettings
 
 __all__ = [
-    "APART", "REST", "Flights", "at_end", "at_rest", "fall_warning", "find_flights", "launched", "pushes_off", "rising",
-    "stays", "to_landing", "touch_words",
+    "APART", "REST", "Flights", "Left", "at_end", "at_rest", "fall_warning", "find_flights", "launched", "pushes_off",
+    "rising", "stays", "to_landing", "touch_words",
 ]  # fmt: skip
 
 APART = 5e-3  # A flight lasts at least that long [s]
@@ -26,6 +27,15 @@ REST = 1e-3  # Rise that the speed of a robot at rest could still give its centr
 IN_CRATER = 1e-3  # Depth of the lowest foot from which on a launch is said to be in its crater [m]
 
 Array = NDArray[np.float64]
+
+
+class Left(NamedTuple):
+    """What is left of a flight at the end of a run."""
+
+    rise: float  # Of the centre of mass from there [m]
+    speed: float  # Upwards, at the end of the run [m/s]
+    fall: float  # Time to the landing [s]
+    along: tuple[float, float]  # Way of the centre of mass along the ground by then [m]
 
 
 @dataclass(frozen=True)
@@ -40,7 +50,7 @@ class Flights:
     """Whether the run ends in a flight."""
     longest: float
     """Duration of the longest [s], 0 without any."""
-    left: tuple[float, float, float] | None = None
+    left: Left | None = None
     """What is left of the flight that the end of the run cuts off, as of `at_end`."""
 
 
@@ -60,7 +70,7 @@ def find_flights(run: RobotRun, heights: Array) -> Flights:
     left = at_end(run, heights) if found and found[-1][1] == len(free) else None
     reached = [lowest[low:high].max() for low, high in found]
     if left is not None:
-        reached[-1] = max(reached[-1], lowest[-1] + left[0])  # the feet rise as the centre of mass does
+        reached[-1] = max(reached[-1], lowest[-1] + left.rise)  # the feet rise as the centre of mass does
     rows = tuple(one for one, height in zip(found, reached, strict=True) if height > 0.0)
     longest = max((end - begin for begin, end in rows), default=0) * run.macro_step
     cut = bool(rows) and rows[-1][1] == len(free)
@@ -79,7 +89,7 @@ def launched(run: RobotRun, heights: Array, begin: int) -> list[str]:
     return [say("launched", time=float(run.columns["time"][begin]), speed=speed, where=where)]
 
 
-def to_landing(run: RobotRun, heights: Array, left: tuple[float, float, float] | None) -> str:
+def to_landing(run: RobotRun, heights: Array, left: Left | None) -> str:
     """How much longer a run must be that ends in the air, in a sentence. ``left``: as of `at_end`.
 
     ``heights``: of the lowest point of each foot at every row [m], shape (row, foot), as of
@@ -89,14 +99,13 @@ def to_landing(run: RobotRun, heights: Array, left: tuple[float, float, float] |
     if run.robot.hangs or (gravity <= 0 and speed >= 0):
         return say("no_landing")
     end, low = float(run.columns["time"][-1]), float(heights[-1].min())
-    fall = -height / speed if left is None else left[2]
+    fall = -height / speed if left is None else left.fall
     where = say("in_crater" if low < 0 else "above_surface", height=1e3 * abs(low))
     return say("landing", fall=fall, where=where, wanted=_above(end + fall))
 
 
-def at_end(run: RobotRun, heights: Array) -> tuple[float, float, float] | None:
-    """What is left of a flight at the end of a run: rise of the centre of mass from there [m], its speed upwards [m/s],
-    and the time to the landing [s]. None where gravity alone does not bring the robot back.
+def at_end(run: RobotRun, heights: Array) -> Left | None:
+    """What is left of a flight at the end of a run. None where gravity alone does not bring the robot back.
 
     ``heights``: as of `to_landing`. MuJoCo continues the flight; where that takes too long it is a parabola, whose rise
     is v^2 / 2 g, 0 where the robot already falls.
@@ -106,10 +115,11 @@ def at_end(run: RobotRun, heights: Array) -> tuple[float, float, float] | None:
         return None
     speed = float(_upwards(run)[-1])
     if (continued := run.robot.onward()) is not None:
-        rise, fall = continued
-        return rise, speed, fall
+        rise, fall, along = continued
+        return Left(rise, speed, fall, (float(along[0]), float(along[1])))
     fall = _fall(max(0.0, float(heights[-1].min())), speed, gravity)
-    return max(0.0, speed) ** 2 / (2 * gravity), speed, fall
+    way = [fall * float(np.gradient(run.columns[name][-3:], run.columns["time"][-3:])[-1]) for name in "xy"]
+    return Left(max(0.0, speed) ** 2 / (2 * gravity), speed, fall, (way[0], way[1]))
 
 
 def at_rest(run: RobotRun, seconds: float) -> bool:

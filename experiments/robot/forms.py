@@ -125,7 +125,7 @@ def _ranges(numbers: Json, best: Answer, more: Sequence[Answer], *, on_grains: b
     if not answers:
         return Forms(words=tuple(map(foldable, _left_out(numbers))))
     ranges = {}
-    for name in ANSWER:
+    for name in best:
         values = [answer[name] for answer in (*answers.values(), *more) if name in answer]
         ranges[name] = entry(name, best[name], min(values), max(values))
     numbers = {**numbers, "ranges": ranges}

@@ -271,6 +271,7 @@ def quantities_of(run: RobotRun, heights: Array, flights: Flights) -> dict[str, 
         "first_touch": (None if touched is None else float(rows["time"][touched]), "s", say("first_touch")),
         "flights": (float(len(flights.rows)), "1", say("flights", apart=1e3 * APART)),
         "longest_flight": (flights.longest, "s", say("longest_flight")),
+        **({"hop_distance": (_hop_distance(run, flights), "m", say("hop_distance"))} if run.robot.travels else {}),
         "sinkage_largest": (float(rows["sinkage"].max()), "m", "of the lowest point of any foot"),
         "sinkage_end": (float(rows["sinkage"][-1]), "m", "the same, at the end"),
         **feet_quantities(feet_reached(run, heights)),
@@ -308,9 +309,24 @@ def _from_lowest(run: RobotRun, flights: Flights) -> float | None:
     if flights.touched is None:
         return None
     z = run.columns["z"][flights.touched :]
-    end = z[-1] + (flights.left[0] if flights.left is not None else 0.0)
+    end = z[-1] + (flights.left.rise if flights.left is not None else 0.0)
     later = np.maximum(np.maximum.accumulate(z[::-1])[::-1], end)
     return float((later - z).max())
+
+
+def _hop_distance(run: RobotRun, flights: Flights) -> float | None:
+    """Way of the centre of mass along the ground in the longest flight [m], with what the end of the run cuts off.
+
+    None where it does not fly.
+    """
+    place = np.column_stack([run.columns["x"], run.columns["y"]])
+    found = []
+    for begin, end in flights.rows:
+        last = min(end, len(place) - 1)
+        left = flights.left if end == len(place) else None
+        way = place[last] - place[begin] + (0.0 if left is None else np.array(left.along))
+        found.append((run.columns["time"][last] - run.columns["time"][begin] + (left.fall if left else 0.0), way))
+    return float(np.hypot(*max(found, key=lambda one: one[0])[1])) if found else None
 
 
 def _ballistic(run: RobotRun, heights: Array, flights: Flights, found: Mapping[str, Number]) -> dict[str, Number]:
@@ -320,7 +336,7 @@ def _ballistic(run: RobotRun, heights: Array, flights: Flights, found: Mapping[s
     """
     if flights.left is None:
         return {}
-    rise, _, fall = flights.left
+    rise, fall = flights.left.rise, flights.left.fall
     rows, (begin, end) = run.columns, flights.rows[-1]
     reached = {
         "highest": float(rows["z"][-1] - rows["z"][0]) + rise,
@@ -340,8 +356,10 @@ def _cut_off(run: RobotRun, heights: Array, flights: Flights) -> str:
     left, landing = flights.left, to_landing(run, heights, flights.left)
     if left is None:
         return say("airborne_for_ever", landing=landing)
-    way = "upwards" if left[1] >= 0 else "downwards"
-    return say("airborne", speed=abs(left[1]), way=way, so_far=_quoted(_highest(run, flights.touched)), landing=landing)
+    way = "upwards" if left.speed >= 0 else "downwards"
+    return say(
+        "airborne", speed=abs(left.speed), way=way, so_far=_quoted(_highest(run, flights.touched)), landing=landing
+    )
 
 
 def _quoted(value: float, unit: str = "m") -> str:
@@ -365,7 +383,9 @@ def _sentences(run: RobotRun, heights: Array, flights: Flights) -> list[str]:
     lost = bounce_words(crater_losses(run, heights, apart=APART))
     stayed = say("still_rises" if rising(run, flights) else "stayed_in_crater" if lost else "stayed")
     longest, cut = _quoted(flights.longest, "s"), say("flew_cut") if flights.at_end else ""
-    flew = say("flew", count=len(flown), apart=1e3 * APART, longest=longest, cut=cut) if flown else stayed
+    hop = _hop_distance(run, flights) if run.robot.travels else None
+    far = say("hopped", distance=_quoted(hop)) if hop is not None else ""
+    flew = say("flew", count=len(flown), apart=1e3 * APART, longest=longest, cut=cut, far=far) if flown else stayed
     told.append(" ".join([flew, *lost]))
     sinkage, time = rows["sinkage"], rows["time"]
     deepest = int(sinkage.argmax())

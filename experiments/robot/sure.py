@@ -17,12 +17,15 @@ from vis.robot.answer import BALLISTIC
 from . import say
 from .plan import RobotPlan
 
-__all__ = ["ANSWER", "Answer", "answer_of", "entry", "in_words", "sure_of_law"]
+__all__ = ["ANSWER", "DISTANCE", "Answer", "answer_of", "entry", "in_words", "sure_of_law"]
 
 ANSWER = {
     "highest": "m", "longest_flight": "s", "clearance_largest": "m", "sinkage_largest": "m", "largest_force": "N",
 }  # fmt: skip
 """Numbers that answer how well a robot hops, with their units. The clearance is of any foot."""
+DISTANCE = "hop_distance"
+"""Also an answer of a robot that can move along the ground [m]."""
+_UNITS = {**ANSWER, DISTANCE: "m"}
 _SIGNED = ("highest",)  # May be below 0: the centre of mass stays below its start
 
 Answer = Mapping[str, float]
@@ -33,6 +36,8 @@ def answer_of(
 ) -> dict[str, float]:
     """The numbers of `ANSWER` from quantities and ``feet_reached`` of a result, ballistic ones before others.
 
+    That of `DISTANCE` too, of a robot that can move along the ground.
+
     ``hop``: False where the robot stays on the ground (`experiments.robot.flight.stays`). Its rise is then 0, and so is
     the clearance of a single foot: a robot of several feet may lift one while it stands on others.
     """
@@ -40,7 +45,8 @@ def answer_of(
     values["clearance_largest"] = max(foot["clearance_largest"] for foot in reached.values())
     if not hop:
         values |= {"highest": 0.0} | ({"clearance_largest": 0.0} if len(reached) == 1 else {})
-    return {name: float(values.get(BALLISTIC.get(name, name), values[name])) for name in ANSWER}
+    along = {DISTANCE: float(values[DISTANCE] or 0.0)} if DISTANCE in values else {}
+    return {name: float(values.get(BALLISTIC.get(name, name), values[name])) for name in ANSWER} | along
 
 
 def entry(name: str, value: float, low: float, high: float) -> Json:
@@ -49,7 +55,7 @@ def entry(name: str, value: float, low: float, high: float) -> Json:
     None is below 0 but that of the rise.
     """
     least = -math.inf if name in _SIGNED else 0.0
-    return {"unit": ANSWER[name], "value": value, "low": max(least, low), "high": max(least, high)}
+    return {"unit": _UNITS[name], "value": value, "low": max(least, low), "high": max(least, high)}
 
 
 def in_words(sure: Mapping[str, Json], *, half: bool) -> str:
@@ -60,7 +66,8 @@ def in_words(sure: Mapping[str, Json], *, half: bool) -> str:
         else between(one["low"], one["high"], one["unit"])
         for name, one in sure.items()
     }
-    return foldable(say("answer", **told))
+    distance = say("answer_distance", **told) if DISTANCE in told else ""
+    return foldable(say("answer", **told, distance=distance))
 
 
 def sure_of_law(plan: RobotPlan, best: Answer, follow: Callable[[RobotPlan], Answer]) -> tuple[Json, str]:
@@ -103,8 +110,7 @@ def _of_stiffness(plan: RobotPlan, best: Answer, follow: Callable[[RobotPlan], A
         return _not_known(plan, say("no_range_of_k", surface=surface.name))
     found = [best, *(follow(_times(plan, factor)) for factor in factors)]
     sure = {
-        name: entry(name, best[name], min(one[name] for one in found), max(one[name] for one in found))
-        for name in ANSWER
+        name: entry(name, best[name], min(one[name] for one in found), max(one[name] for one in found)) for name in best
     }
     key = str(how.pop("key"))
     return sure, say(key, surface=surface.name, words=in_words(sure, half=False), **how)

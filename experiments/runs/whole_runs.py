@@ -15,8 +15,8 @@ from .progress import Progress
 from .result import Result
 
 __all__ = [
-    "PictureCosts", "computed_run", "draw_plots", "draw_report", "keeping_status", "publish", "whole_run",
-    "without_reports", "write_report",
+    "PictureCosts", "computed_run", "draw_plots", "draw_report", "keeping_status", "publish", "report_called",
+    "whole_run", "without_reports", "write_report",
 ]  # fmt: skip
 
 # What the report of `penetrate` takes with OpenGL in software on two cores [s], by the files' times of two runs, of
@@ -31,6 +31,7 @@ _SHARE_PLOTS, _SHARE_PICTURES, _SHARE_STILL = 0.1, 0.95, 4
 
 Settings = TypeVar("Settings", bound=BaseModel)
 _DRAWN = ContextVar("_DRAWN", default=True)  # whether runs draw their reports
+_STAGE = ContextVar("_STAGE", default="report")  # what the progress calls the drawing of a report
 
 
 @contextmanager
@@ -41,6 +42,16 @@ def without_reports(without: bool = True) -> Iterator[None]:
         yield
     finally:
         _DRAWN.reset(token)
+
+
+@contextmanager
+def report_called(stage: str) -> Iterator[None]:
+    """Within, the drawing of a report is this stage of the progress: one of several reports in one plan."""
+    token = _STAGE.set(stage)
+    try:
+        yield
+    finally:
+        _STAGE.reset(token)
 
 
 @contextmanager
@@ -127,7 +138,7 @@ def draw_report(folder: RunFolder, progress: Progress, *costs: PictureCosts) -> 
     """The report of a folder that has its result, as the last stage of a run; nothing `without_reports`."""
     if not _DRAWN.get():
         return
-    progress.stage("report", total=1.0)
+    progress.stage(_STAGE.get(), total=1.0)
     write_report(folder.path, progress, *costs)
 
 

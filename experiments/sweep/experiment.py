@@ -24,6 +24,7 @@ from .settings import SweepSettings
 __all__ = ["check", "resume", "run"]
 
 _REPORT = 5.0  # What the table and the page take [s]
+_ONE_BY_ONE = "one run after the other, without dask: pip install 'hedgebed[sweep]' for several at a time"
 
 
 def check(settings: SweepSettings) -> None:
@@ -36,8 +37,7 @@ def check(settings: SweepSettings) -> None:
 
 def _where(settings: SweepSettings) -> Where:
     """Where the runs are computed: by default on all cores, since runs of unknown cost may be long."""
-    where = Where.of(settings)
-    return where if where.scheduler is not None else Where(None, where.workers or cores_there())
+    return Where.of(settings).on_all_cores()
 
 
 def _carry_out(settings: SweepSettings, folder: RunFolder, progress: Progress) -> Result:
@@ -48,6 +48,8 @@ def _carry_out(settings: SweepSettings, folder: RunFolder, progress: Progress) -
         cores = 1 if where.scheduler is not None else min(where.workers or 1, cores_there())
         costs, words = cost_words(settings.experiment, design.points, cores)
         progress.message(f"{len(tasks)} runs of {settings.experiment}: {words}")
+        if where.workers == 1 and Where.of(settings).workers is None and cores_there() > 1:
+            progress.message(_ONE_BY_ONE)
         planned = [
             Planned(task, point.words, cost) for task, point, cost in zip(tasks, design.points, costs, strict=True)
         ]

@@ -46,7 +46,7 @@ class SweepSettings(StrictSettings):
     # Where it is computed
     workers: int | None = Field(None, ge=1, le=1024)
     """Number of processes on this machine, each with one run at a time; 1 needs no dask; one for each core if not
-    given."""
+    given, 1 where dask is not installed."""
     threads: int | None = Field(None, ge=1, le=1024)
     """CPU threads of each run; the cores here shared out evenly, or 1 on a cluster, if not given."""
     scheduler: Scheduler = None

@@ -94,6 +94,9 @@ def test_no_name_in_a_campaign_runs_in_the_page_of_its_diagnosis_or_is_toml(brow
     for path in (tmp_path / "out").rglob("*.toml"):
         trials = tomllib.loads(path.read_text(encoding="utf-8")).get("trial", [])
         assert "made-by-a-name" not in [trial["id"] for trial in trials]
+    pushed = ["penetrate", "--ground", "spring-damper", "--model", "out/model.toml", "--tip-diameter", "12mm"]
+    assert main([*pushed, "--out", "pushed", "--quiet"]) == 0
+    opened(browser, tmp_path / "pushed" / "report.html")
 
 
 NAME = "<img src=x onerror='window.taken = 1'>"

@@ -31,6 +31,11 @@ def hedgehog(**given_):
     return Tumbler(**({"mass": 5.3, "inertia": 0.06, "spike_length": 0.2} | given_))
 
 
+def test_a_launch_states_the_lean_that_was_taken_also_where_none_is_given():
+    assert math.degrees(impulsive_launch(hedgehog(gravity=0.1), 0.4).lean) == pytest.approx(22.5)
+    assert brake_launch(hedgehog(gravity=0.1, lean=0.7), 0.4, 10.0).lean == 0.7
+
+
 # Launch ---------------------------------------------------------------------------------------------------------------
 
 

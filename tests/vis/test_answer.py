@@ -18,7 +18,7 @@ from vis.page.page import Page, Section, Tile, listing, text
 from vis.page.sentences import label_of
 from vis.paper.report import CASE_HEAD
 from vis.report import write_report
-from vis.robot.answer import answer_tiles
+from vis.robot.answer import DISTANCE, answer_tiles
 from vis.tumble.answer import answer_tiles as tumble_tiles
 from vis.tumble.beside import beside_rows
 
@@ -111,12 +111,19 @@ def test_a_robot_states_each_error_of_its_answer_or_that_it_is_not_known(more, e
     sinkage = next(row for row in numbers.rows if row[0] == "Sinkage")
     assert tuple(cell.replace("\N{NO-BREAK SPACE}", " ") for cell in sinkage[1:-1]) == errors
     assert len(numbers.head) == len(errors) + 2
+    on_law = more["ground"] == "rft"  # which may be no law of sand, as on brick
+    assert numbers.head[-2] == ("laws of sand" if "forms" in more else "other laws") or not on_law
 
 
 def test_a_robot_that_starts_above_the_surface_states_the_height_below_its_rise():
     said = [answer(answer_tiles(robot_result()), robot_result(ground="rft", start_height=high))[-1].text
             for high in (0.01, 0.0)]  # fmt: skip
     assert "10\N{NO-BREAK SPACE}mm above" in said[0] and "mm above" not in said[1]
+    hops = robot_result(ground="rft", start_height=0.01)
+    hops["quantities"]["hop_distance"] = {"value": 0.3, "std": None, "unit": "m"}
+    shown = answer(answer_tiles(hops), hops)
+    assert "Clearance" in said[0] and "Clearance" not in shown[-1].text
+    assert [row[0] for row in shown[0].rows][1] == DISTANCE[0]
 
 
 def test_a_flight_that_the_run_cuts_off_heads_the_answer_with_its_apex():
@@ -302,8 +309,8 @@ def test_a_terminal_ends_with_words_and_not_with_keys(name):
 def test_errors_that_no_row_of_a_bed_knows_are_named_below_the_table():
     result = read_result(KEPT / "bed-test-repose" / "result.json")
     shown = headline_of(EXPERIMENTS["bed test repose"], result)
-    assert shown.rows[0] == ("Angle of repose", "31.2°", "1.5°")
-    assert shown.head == ("", "value", "± chance")
+    assert shown.rows[0] == ("Angle of repose", "31°", "4°")  # 4.303 x 1.515 / sqrt(3)
+    assert len(shown.head) == 3 and shown.head[2].endswith("(95\N{NO-BREAK SPACE}%)")
     assert all(name in shown.notes[0] for name in ("grain size", "softness"))
 
 

@@ -128,3 +128,8 @@ def test_numbers_of_one_sentence_have_one_unit_and_an_end_that_is_hardly_below_0
 
 def test_an_angle_of_rounding_is_nought_degrees():
     assert [cell_of(math.radians(value), None, "rad") for value in (6.75e-9, 0.012)] == ["0°", "0.012°"]
+
+
+@pytest.mark.parametrize(("half", "shown"), [(48.0, "66° ± 48°"), (120.0, "66° ± 120°"), (4.8, "66° ± 5°")])
+def test_an_angle_is_not_rounded_to_tens_beside_the_same_angle_in_a_sentence(half, shown):
+    assert cell_of(math.radians(65.7), math.radians(half), "rad") == shown

@@ -70,6 +70,18 @@ def test_the_report_of_a_tumble_has_its_figures_numbers_and_warnings(folder):
     assert "https://" not in page and "<script" not in page
 
 
+def test_the_report_of_a_tumble_on_a_law_holds_the_scene_which_can_be_turned_and_stays_small(folder):
+    result = json.loads((folder / "result.json").read_text())
+    for name, value in {"weight": 0.9, "mass": 5.3, "stiffness": 80.0, "damping": 0.3}.items():
+        result["trial"][name] = {"value": value, "unit": "SI", "origin": "given"}
+    (folder / "result.json").write_text(json.dumps(result))
+    page = write_report(folder)
+    text = page.read_text()
+    assert text.count("class Viewer") == 1 and text.index('class="head"') < text.index("data:image/png")
+    assert page.stat().st_size < 1e6
+    assert "class Viewer" not in write_tumble_report(folder, pictures=False).read_text()
+
+
 def test_the_picture_of_the_path_has_the_title_of_the_result(folder, monkeypatch):
     titles, draw = {}, Report.draw
 

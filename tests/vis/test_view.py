@@ -23,6 +23,7 @@ from vis.page.page import Page, Section
 from vis.pictures import render
 from vis.pictures.canvas import colour_values
 from vis.pictures.frames import FrameWriter, read_frames
+from vis.view.curves import line as of_line
 from vis.view.curves import of_tumble
 from vis.view.packing import Codes, pack, unpack
 from vis.view.page import IN_REPORT, report_scene, write_view
@@ -122,6 +123,13 @@ def test_peaks_of_a_curve_survive_its_thinning(page):
     assert (bed["name"], law["name"], law["dashed"]) == ("bed", "spring-damper", True)
     table = np.genfromtxt(page.parent / "series" / f"{scenes[0]['id']}.csv", delimiter=",", skip_header=1)
     assert max(bed["y"]) == pytest.approx(table[:, 3].max(), rel=1e-3)
+
+
+def test_a_small_change_far_from_zero_has_no_steps_and_noise_of_rounding_is_hidden():
+    time = np.linspace(0.0, 1.0, 501)
+    height = of_line("", time, 179.145 + 0.02 * time)
+    assert height["y"] == pytest.approx(179.145 + 0.02 * time, abs=5e-5) and len(set(height["y"])) > 200
+    assert set(of_line("", time, 179.145 + 1e-12 * np.sin(99.0 * time))["y"]) == {179.145}
 
 
 def test_a_force_that_is_a_running_mean_says_so_in_its_label(tmp_path):

@@ -7,7 +7,7 @@ from pathlib import Path
 from matplotlib.axes import Axes
 from matplotlib.patches import Patch
 
-from rigid.intervals import half_of
+from rigid.intervals import NORMAL, half_of
 from vis.bed.tests import cut_profiles, flank_lines, quoted, thicknesses
 from vis.page.answer import MOST_ROWS
 from vis.page.page import Block, Section, Tile, code, text
@@ -54,6 +54,11 @@ def answer_tiles(result: Result) -> list[Tile]:
     return tiles[:MOST_ROWS]
 
 
+def _simulated(entry: Result) -> float | None:
+    """The figure in the beds of the check; folders of an older hedgebed have it as `measured`."""
+    return entry["simulated"] if "simulated" in entry else entry["measured"]
+
+
 def _axis_words(entry: Result) -> str:
     kind = f", {entry['plane']}" if entry["plane"] not in (None, "shear") else ""
     return f"{entry['name'].replace('_', ' ')}{kind} [{entry['unit']}]"
@@ -76,7 +81,7 @@ def _response(report: Report, key: str) -> Block:
         found = [point["moved"][key][name] for point in result["points"]]
         error = [point["figures"][name][1] for point in result["points"]]
         axis.errorbar(at, found, yerr=error, color=BED, marker="o", ms=4, ls="")
-        end, off = entry["measured"], entry["error"]
+        end, off = _simulated(entry), entry["error"]
         axis.errorbar([best], [end], yerr=[off], color=INK, marker="D", ms=5, ls="", zorder=5)
         axis.axvline(best, color=INK, lw=0.8, ls=(0, (2, 2)))
         axis.set(xlabel=f"{key.replace('_', ' ')} [{unit}]", ylabel=_axis_words(entry))
@@ -93,13 +98,13 @@ def _response(report: Report, key: str) -> Block:
 
 
 def _residuals(report: Report) -> Block:
-    """What was measured at the end less what was wanted, in tolerances."""
-    entries = [entry for entry in report.result["figures"] if entry["measured"] is not None]
+    """What was simulated at the end less what was wanted, in tolerances."""
+    entries = [entry for entry in report.result["figures"] if _simulated(entry) is not None]
     drawing, (axis,) = new_panels(1, height=0.9 + 0.45 * len(entries))
     axis.axvspan(-1, 1, color=MODEL, alpha=0.18, lw=0)
     axis.axvline(0, color=GREY, lw=0.8)
     for k, entry in enumerate(reversed(entries)):
-        off = (entry["measured"] - entry["wanted"]) / entry["tolerance"]
+        off = (_simulated(entry) - entry["wanted"]) / entry["tolerance"]
         error = (entry["error"] or 0.0) / entry["tolerance"]
         colour = BED if entry["fitted"] else GREY
         axis.errorbar([off], [k], xerr=[2 * error], color=colour, marker="o" if entry["fitted"] else "s", ls="")
@@ -149,7 +154,7 @@ def _slopes(report: Report) -> list[Block]:
     def draw(axis: Axes, test: Result, x: Array, thickness: Array, standing: Array | None) -> str:
         axis.plot(x, thickness, color=BED, marker=".", ls="none")
         flank_lines(axis, test, start=0.5 * test["slot"], period=test["size"][0], colour=MODEL)
-        return f"seed {test['seed']}: {test['angle']:.1f} ± {test['error']:.1f}°"
+        return f"seed {test['seed']}: {test['angle']:.1f} ± {NORMAL * test['error']:.1f}°"
 
     return thicknesses(report, [test for test in _checked(report.result) if test["state"] == "drained"], draw, "slopes")
 

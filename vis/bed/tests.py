@@ -14,6 +14,8 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import LogLocator
 from numpy.typing import NDArray
 
+from rigid.intervals import NORMAL, half_width, student
+from vis.bed.errors import in_95
 from vis.page.numbers import quote
 from vis.page.page import Block, Section, Tile, text
 from vis.page.plots import BED, MODEL, Array, handle, legend_above, new_panels, shades, smooth_ratio
@@ -24,6 +26,7 @@ from vis.pictures.frames import read_frames
 
 __all__ = [
     "FALLEN_SHARE",
+    "PARTS",
     "answer_tiles",
     "cut_profiles",
     "flank_lines",
@@ -50,7 +53,7 @@ def write_test_report(report: Report) -> Path:
     bed = say("first_bed", one=one, sides=sides, step=1e6 * one["time_step"], **scaled)
     sections = [
         Section("", [*tables(result), *(block for draw in plots for block in draw(report))]),
-        Section("How it is measured", [*(text(words) for words in method), text(bed)]),
+        Section("How it is computed", [*(text(words) for words in method), text(bed)]),
         report.numbers(std=True),
         again(f"hedgebed {command} run.toml"),
     ]
@@ -58,7 +61,7 @@ def write_test_report(report: Report) -> Path:
 
 
 def quoted(entry: Result, scale: float = 1.0, unit: str = "") -> str:
-    """A quantity with its spread, for a tile."""
+    """A quantity with its error, for a tile: a std that is half of a 95 % interval."""
     if entry["value"] is None:
         return "–"
     value, std = scale * entry["value"], entry["std"]
@@ -116,9 +119,13 @@ def _draw_grains(axis: Axes, grains: Grains, *, period: float, unit: float, top:
 
 
 def _cone_tiles(result: Result) -> list[Tile]:
-    quantities, one = result["quantities"], result["runs"][0]
+    quantities, one = in_95(result), result["runs"][0]
     return [
-        Tile("Gradient of the cone index", quoted(quantities["gradient"], 1e-6, " MPa/m"), "spread between the pushes"),
+        Tile(
+            "Gradient of the cone index",
+            quoted(quantities["gradient"], 1e-6, " MPa/m"),
+            f"mean of {len(result['runs'])} pushes",
+        ),
         Tile("Over the unit weight", quoted(quantities["gradient_over_weight"]), "gradient / (bulk density g)"),
         Tile("Cone index at the end", quoted(quantities["index_at_end"], 1e-3, " kPa"), "last tenth of the way"),
         Tile("Speed", f"{1e3 * one['speed']:.3g} mm/s", f"v / sqrt(g D) = {one['froude']:.2g}"),
@@ -173,7 +180,7 @@ def _cone_side(report: Report) -> list[Block]:
 
 
 def _plates_tiles(result: Result) -> list[Tile]:
-    quantities = result["quantities"]
+    quantities = in_95(result)
 
     def share(name: str) -> str:
         return f"{100 * quantities[name]['value']:.0f} %"
@@ -196,15 +203,14 @@ def _forces_of_plates(report: Report) -> list[Block]:
     for axis, key, label in zip(panels, ("x", "z"), ("backwards, $-F_x$", "upwards, $F_z$"), strict=True):
         sign = -1.0 if key == "x" else 1.0
         measured = [sign * row[f"force_{key}"] for row in rows]
-        axis.errorbar(
-            measured, place, xerr=[row[f"std_{key}"] or 0.0 for row in rows], fmt="o", color=BED, ms=4, capsize=2
-        )
+        half = [half_width(row[f"std_{key}"], row["beds"]) or 0.0 for row in rows]
+        axis.errorbar(measured, place, xerr=half, fmt="o", color=BED, ms=4, capsize=2)
         axis.plot([sign * row[f"law_{key}"] for row in rows], place, "x", color=MODEL, ms=6)
         axis.axhline(len(report.result["plates"]) - 0.5, color="#999999", lw=0.8)
         axis.set(xlabel=f"force {label} [N]")
     panels[0].set_yticks(place, names)
     panels[0].invert_yaxis()
-    bed = handle("bed, ± standard deviation of the beds", BED, marker="o", ms=4)
+    bed = handle("bed, ± 95 % of the mean over beds", BED, marker="o", ms=4)
     legend_above(drawing, [bed, handle("fitted law", MODEL, marker="x", ms=6, ls="")])
     return [report.draw("plates", drawing)]
 
@@ -217,7 +223,7 @@ FALLEN_SHARE = 0.2
 
 
 def _cut_tiles(result: Result) -> list[Tile]:
-    quantities, runs = result["quantities"], result["runs"]
+    quantities, runs = in_95(result), result["runs"]
     bounds = [run["low"] for run in runs], [run["high"] for run in runs if run["high"] is not None]
     between = f"more than {1e3 * min(bounds[0]):.3g} mm" if any(bounds[0]) else "no face stood"
     if len(bounds[1]) == len(runs):
@@ -293,9 +299,9 @@ def _trials(report: Report) -> list[Block]:
 
 
 def _repose_tiles(result: Result) -> list[Tile]:
-    quantities, runs = result["quantities"], result["runs"]
+    quantities, runs = in_95(result), result["runs"]
     return [
-        Tile("Angle of repose", quoted(quantities["angle_of_repose"], 1.0, "°"), "drained; spread between the runs"),
+        Tile("Angle of repose", quoted(quantities["angle_of_repose"], 1.0, "°"), "drained; mean of two slopes a bed"),
         Tile("Slopes", f"{2 * len(runs)}", f"{len(runs)} beds, two each"),
         Tile("Crest", quoted(quantities["crest"], 1e3, " mm"), f"grains of {1e3 * runs[0]['grain']:.3g} mm"),
         Tile("Packing fraction", quoted(quantities["packing_fraction"]), "before the slot was opened"),
@@ -336,7 +342,7 @@ def _repose_profiles(report: Report) -> list[Block]:
         axis.plot(x, thickness, color=BED, marker=".", ls="none")
         flank_lines(axis, run, start=0.5 * run["slot"], period=run["size"][0], colour=MODEL)
         axis.axhline(1e3 * run["surface"], color="#888888", lw=0.8, ls="--")
-        return f"{run['id']}: {run['angle']:.1f} ± {run['error']:.1f}°"
+        return f"{run['id']}: {run['angle']:.1f} ± {NORMAL * run['error']:.1f}°"
 
     dots, fit = handle("bed", BED, marker=".", ls="none"), handle("fit", MODEL)
     before = handle("surface before", "#888888", ls="--", lw=0.8)
@@ -374,6 +380,10 @@ _TESTS: dict[str, tuple[tuple[_Drawer, ...], tuple[str, ...]]] = {
 # A lid shears it ------------------------------------------------------------------------------------------------------
 
 
+PARTS = 5
+"""Of a lid's way, whose scatter gives the error of a critical stress: `experiments.bed.shear`'s, as a test shows."""
+
+
 @report_of(named=True)
 def write_shear_report(report: Report) -> Path:
     """Make figures/ and report.html of the folder of a shear test, and return the report."""
@@ -387,8 +397,8 @@ def write_shear_report(report: Report) -> Path:
 
 
 def _shear_tiles(result: Result) -> list[Tile]:
-    quantities = result["quantities"]
-    slope = "slope through the runs"
+    quantities = in_95(result)
+    slope = f"slope through {len(result['runs'])} runs"
     numbers = (
         ("Critical friction angle", "critical_friction_angle", "°", slope),
         ("Peak friction angle", "peak_friction_angle", "°", slope),
@@ -426,7 +436,7 @@ def _lines(report: Report) -> Block:
     for kind, colour, mark in (("peak", MODEL, "D"), ("critical", BED, "o")):
         slope = math.tan(math.radians(quantities[f"{kind}_friction_angle"]["value"]))
         axis.plot(reach, quantities[f"{kind}_cohesion"]["value"] + slope * reach, color=colour, lw=1.2)
-        error = [run["critical_error"] if kind == "critical" else 0.0 for run in runs]
+        error = [student(PARTS - 1) * run["critical_error"] if kind == "critical" else 0.0 for run in runs]
         axis.errorbar(normal, [run[kind] for run in runs], yerr=error, color=colour, marker=mark, ls="")
         handles.append(handle(kind, colour, marker=mark))
     axis.set(xlim=(0.0, None), ylim=(0.0, None), xlabel="normal stress [Pa]", ylabel="shear stress [Pa]")

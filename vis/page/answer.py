@@ -117,7 +117,7 @@ def _errors(result: Mapping[str, Any], on_grains: bool) -> tuple[Sequence[str], 
     keys = ["empty_cells"] if on_grains else []
     if experiment == "diagnose":
         return (say("of_fit"), *_ERRORS[1:]), keys
-    if experiment == "bed calibrate":
+    if str(experiment).startswith(("bed calibrate", "bed test")):
         return (say("of_95"), *_ERRORS[1:]), keys
     if experiment == "ground":
         return (say("of_map"), *_ERRORS[1:]), ["sum_of_map"]
@@ -137,16 +137,18 @@ def _errors_of_robot(result: Mapping[str, Any], on_grains: bool) -> tuple[Sequen
     forms, hop = "forms" in result, result.get("hop", True)
     rise = [result["quantities"].get("highest", {}).get("value")] if hop else []
     rise += [one["low"] for one in [(result.get("forms") or {}).get("ranges", {}).get("highest")] if one]
+    lifted = hop and (result.get("start_height") or 0.0) > LIFTED
+    along = (result["quantities"].get("hop_distance") or {}).get("value") is not None  # in place of the clearance
     told = {
         "one_bed": on_grains and "beds" not in result, "laws_of_sand": forms and not on_grains,
-        "laws_and_grains": forms and on_grains, "start_of_rise": hop and (result.get("start_height") or 0.0) > LIFTED,
+        "laws_and_grains": forms and on_grains, "start_of_rise": lifted, "of_clearance": lifted and not along,
         "below_start": any((one or 0.0) < 0 for one in rise), "no_error": True,
     }  # fmt: skip
     chance = say("of_95") if "beds" in result else _ERRORS[0]
     if on_grains:
         return (chance, _ERRORS[1], say("with_laws") if forms else _ERRORS[2]), [key for key, so in told.items() if so]
     first = say("of_the_law") if "ground_file" in result else say("left_open")
-    return (first, _ERRORS[1], say("over_laws")), [key for key, so in told.items() if so]
+    return (first, _ERRORS[1], say("over_laws" if forms else "other_laws")), [key for key, so in told.items() if so]
 
 
 def _row(tile: Tile) -> tuple[str, ...]:

@@ -8,7 +8,7 @@ from typing import Any
 
 from rigid.intervals import NORMAL
 from vis.page.limits import bias_of, kind_of, known_errors
-from vis.page.numbers import quote, short, split_spread
+from vis.page.numbers import digits_for, quote, short, split_spread
 from vis.page.page import Tile
 from vis.page.sentences import Sentences
 
@@ -66,7 +66,10 @@ def _row_on_grains(
 
 
 def cell_of(value: float | None, std: float | None, unit: str) -> str:
-    """A number with its spread, where it has one; an angle in degrees, "none" for None."""
+    """A number with its spread, where it has one; an angle in degrees, "none" for None.
+
+    An angle is not rounded to tens: 66° ± 48°, beside 65.7 degrees in a sentence.
+    """
     if value is None:
         return "none"
     if unit != "rad":
@@ -74,7 +77,9 @@ def cell_of(value: float | None, std: float | None, unit: str) -> str:
     if not std:
         degrees = math.degrees(value)
         return f"{short(degrees if abs(degrees) >= ROUND_OFF else 0.0, 3)}°"
-    return " ± ".join(f"{part.strip()}°" for part in quote(math.degrees(value), math.degrees(std)).split("±"))
+    angle, half = math.degrees(value), math.degrees(std)
+    text = quote(angle, half) if digits_for(half) >= 0 else f"{quote(round(angle))} ± {quote(round(half))}"
+    return " ± ".join(f"{part.strip()}°" for part in text.split("±"))
 
 
 def _with_error(result: Mapping[str, Any], name: str, law: bool) -> tuple[str, str]:

@@ -94,7 +94,7 @@ def _caveat(result: Mapping[str, Any], quantities: Mapping[str, Any]) -> str:
     bed = words.mapping_of(result.get("bed"))
     overlap, grain = words.value_of(quantities, "max_overlap"), words.plain_value(bed.get("grain"))
     factor = words.plain_value(words.mapping_of(bed.get("softening")).get("factor"))
-    real = REAL_GRAINS.get(str(bed.get("material")))
+    real = words.plain_value(bed.get("real_grain")) or REAL_GRAINS.get(str(bed.get("material")))  # of an older hedgebed
     parts = []
     if factor is not None and factor > 1.05:
         parts.append(f"softened {quote(1.001 * factor, None, '1', significant=2)} times")

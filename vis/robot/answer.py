@@ -23,6 +23,7 @@ BALLISTIC = {
 }  # fmt: skip
 """Number of the answer -> the quantity in its place where the end of the run cuts off a flight."""
 FROM_LOWEST = ("Rise from its lowest point", "of the centre of mass, after the first touch")
+DISTANCE = ("Distance of the hop", "of the centre of mass along the ground, longest flight")
 NO_HOP, STAYED = "none", "it did not leave the ground"
 SO_FAR = "up to the end of the run, where it is on its way up"
 OF_FLIGHT = "ballistic: the flight at the end of the run, continued without the ground"
@@ -47,7 +48,8 @@ def answer_tiles(result: Mapping[str, Any]) -> list[Tile]:
         found["clearance_largest"] = {"value": highest, "std": None, "unit": "m"}
     hop, rising = result.get("hop", True), result.get("rising", False)  # an older hedgebed has neither
     rows = []
-    for name, (label, note) in _labels(hop=hop, several=len(reached) > 1).items():
+    along = (quantities.get("hop_distance") or {}).get("value") is not None
+    for name, (label, note) in _labels(hop=hop, several=len(reached) > 1, along=along).items():
         if name not in found:  # a folder of an older hedgebed
             continue
         if rising and name in BALLISTIC:
@@ -70,11 +72,15 @@ def answer_tiles(result: Mapping[str, Any]) -> list[Tile]:
     return [*rows, Tile("Energy error", quantity(quantities["energy_residual"]), note)]
 
 
-def _labels(*, hop: bool, several: bool) -> dict[str, tuple[str, str]]:
+def _labels(*, hop: bool, several: bool, along: bool) -> dict[str, tuple[str, str]]:
     """`LABELS`; without a hop the rise from the lowest point is in place of the clearance of a single foot.
 
-    A robot of several feet may lift one while it stands on others: there it is in place of the flight.
+    A robot of several feet may lift one while it stands on others: there it is in place of the flight. ``along``: a hop
+    has a distance, which is in place of the clearance.
     """
+    if hop and along:
+        found = {name: words for name, words in LABELS.items() if name != "clearance_largest"}
+        return {"highest": found.pop("highest"), "hop_distance": DISTANCE, **found}
     if hop:
         return LABELS
     left_out = "longest_flight" if several else "clearance_largest"

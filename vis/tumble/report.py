@@ -49,6 +49,7 @@ def write_tumble_report(
     """Make figures/, animation.gif and report.html of the folder of a tumble, and return the report.
 
     ``pictures``: Whether to draw the platform on its ground in space, stills and film; None: where there are grains.
+    On a law None gives the scene alone, which can be turned.
     ``colour``: What grains are coloured by, a key of `vis.pictures.canvas.COLOURS`. ``film``: Whether to make the film.
     Raises FileNotFoundError where the folder has no trajectory.csv or result.json.
     """
@@ -79,6 +80,8 @@ def write_tumble_report(
         sections.insert(1, grains_section(report))
     if pictures if pictures is not None else "grains" in result and (home / "frames" / "tumble.pvd").exists():
         sections.insert(1, _seen(report, colour, film))
+    elif pictures is None and "grains" not in result and "weight" in result["trial"]:  # an older folder has none
+        sections.insert(1, Section("Scene", report_scene(report.folder)))
     lead = ["tumble", f"{result['duration']:g} s", f"{len(numbers['t_s'])} rows"]
     return report.write(sections, lead=lead, tiles=answer_tiles(result))
 

@@ -4,6 +4,7 @@ Forces of grains on a platform or robot are running means, and the label says ov
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from itertools import pairwise
 from pathlib import Path
@@ -72,8 +73,15 @@ def line(name: str, time: Array, values: Array, *, colour: str = BED, dashed: bo
         time, values = time[kept], values[kept]
     return {
         "name": name, "colour": colour, "dashed": dashed,
-        "t": [float(f"{t:.6g}") for t in time], "y": [float(f"{y:.4g}") for y in values],
+        "t": [float(f"{t:.6g}") for t in time], "y": [float(f"{y:.{_digits(values)}g}") for y in values],
     }  # fmt: skip
+
+
+def _digits(values: Array) -> int:
+    """Digits with which the range of values has a thousand steps at least; at most 7, so that noise stays hidden."""
+    reach = float(np.ptp(values)) if len(values) else 0.0
+    beside = float(np.abs(values).max()) / reach if reach > 0 else 1.0
+    return min(7, 4 + math.ceil(math.log10(max(1.0, beside))))
 
 
 def panel(label: str, *lines: Line) -> list[Panel]:

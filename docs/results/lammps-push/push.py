@@ -5,6 +5,8 @@
 
 `--seeds 1 2 3` pushes into that many beds, one after the other; with `--out` each bed's forces are written as it ends.
 `--finer 2 4` repeats all runs with steps that are so many times shorter, from the same grains, over the same time.
+`--kept` keeps the springs of contacts: all runs begin from the prepared bed as it is, at rest. Without it all of them
+begin with contacts that have no history, as did the kept files of before 2026-11-29.
 
 LAMMPS and mpiexec must be there: `hedgebed doctor` says how to install them.
 """
@@ -36,6 +38,7 @@ parser.add_argument("--finer", type=int, nargs="+", default=(1,), help="steps in
 parser.add_argument(
     "--change", nargs="+", default=(), metavar="KEY=NUMBER", help="of the material, after the preparation"
 )
+parser.add_argument("--kept", action="store_true", help="begin with the springs of contacts, in all runs")
 parser.add_argument("--threads", type=int, default=1, help="of our bed")
 parser.add_argument("--alone", action="store_true", help="LAMMPS alone")
 parser.add_argument("--out", type=Path, help="a CSV of the forces")
@@ -71,13 +74,16 @@ def push(bed, start, asked, pids, finer):
 
 def push_all(asked, seed):
     """Forces and costs by name of the pushes into the bed of this seed, as `push` has them; its time step [s]."""
-    piece = Bed.prepare("sand", size=tuple(asked.size), grain=asked.grain, gravity=9.81, seed=seed, threads=1)
+    threads = asked.threads if asked.kept else 1
+    piece = Bed.prepare("sand", size=tuple(asked.size), grain=asked.grain, gravity=9.81, seed=seed, threads=threads)
     stuff = replace(piece.material, **{key: float(number) for key, number in (one.split("=") for one in asked.change)})
     grains = piece.repeated(asked.copies).grains()
     size = (asked.copies * asked.size[0], *asked.size[1:])
 
     def fresh(finer):
-        """The bed without the history of its contacts, which LAMMPS cannot take over."""
+        """The bed, without the history of its contacts unless that is asked for."""
+        if asked.kept:
+            return piece.repeated(asked.copies, height=0.2)
         return Bed.from_grains(
             stuff, positions=grains.position, radii=grains.radius, velocities=grains.velocity,
             spins=grains.spin, size=size, height=0.2, time_step=piece.time_step / finer, threads=asked.threads,
@@ -100,6 +106,8 @@ def push_all(asked, seed):
         for ranks in asked.ranks:
             began, bed = time.monotonic(), LammpsBed(fresh(finer), ranks=ranks)
             name = f"lammps on {ranks} ranks{suffix}"
+            if asked.kept:
+                print(f"springs of {bed.springs} contacts went over {bed.springs_fault}", flush=True)
             columns[name], costs[name] = push(bed, start, asked, bed.processes, finer)
             print(f"{name}: {time.monotonic() - began:.3g} s in all")
             bed.close()
@@ -131,6 +139,8 @@ def written(path, asked, columns, time_step):
 
 def main():
     asked = parser.parse_args()
+    if asked.kept and (asked.change or list(asked.finer) != [1]):
+        parser.error("--kept begins from the prepared bed: it takes neither --change nor --finer")
     for seed in asked.seeds:
         columns, time_step = push_all(asked, seed)
         if asked.out is not None:

@@ -6,12 +6,15 @@ The tests need LAMMPS and mpiexec (`apt install lammps openmpi-bin`), and are sk
 import math
 import os
 import signal
+import tempfile
+from contextlib import suppress
 from dataclasses import replace
 from functools import cache
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from faults.test_disk import small_disk
 
 from coupling import BedGround, CoupledTumble, platform_members
 from coupling.ground import part_of
@@ -348,6 +351,24 @@ def test_a_killed_rank_is_an_error_with_a_sentence_and_the_state_before_can_be_g
     second.restore(kept)
     found = pushed(second, body, 2)
     assert np.abs(found - expected).max() < 0.01 * np.abs(expected).max()
+
+
+def test_on_a_full_disk_neither_numbers_nor_a_state_are_taken_and_the_file_is_named(bed, tmp_path, monkeypatch):
+    """LAMMPS of 2021 tells nothing of a dump that it could not write, and ends at a restart file."""
+    with small_disk(tmp_path / "disk", 2**22) as disk:
+        monkeypatch.setattr(tempfile, "tempdir", str(disk))
+        theirs = LammpsBed(bed, ranks=1)
+        for path in disk.glob("*/all.txt"):  # which leaves no room either
+            path.unlink()
+        with suppress(OSError), (disk / "filled").open("wb", buffering=0) as file:
+            while True:
+                file.write(bytes(512))
+        for asked, name in ((theirs.grains, "all.txt"), (theirs.state, "kept.restart")):
+            with pytest.raises(OSError, match="disk full") as caught:
+                asked()
+            assert caught.value.filename.endswith(name)
+        (disk / "filled").unlink()
+        theirs.close()
 
 
 @pytest.mark.long

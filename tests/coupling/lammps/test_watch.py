@@ -49,6 +49,12 @@ def all_ended(pids, within=5.0):
     return not alive(pids)
 
 
+def cores_of(process):
+    """On which cores it may run, as text (the suite has its own `os.sched_getaffinity`)."""
+    lines = (Path("/proc") / str(process) / "status").read_text().splitlines()
+    return next(line for line in lines if line.startswith("Cpus_allowed_list"))
+
+
 def test_a_closed_pipe_ends_the_command_with_its_children_and_removes_the_folder(tmp_path):
     folder = tmp_path / "work"
     folder.mkdir()
@@ -101,6 +107,18 @@ def test_an_error_of_lammps_is_told_apart_from_a_killed_rank():
         [lammps.tell(["nonsense"]), lammps.wait()]
     assert ended.value.refused
     lammps.close()
+
+
+def test_a_rank_may_run_on_every_core_that_hedgebed_may():
+    """Open MPI would bind the first rank of each run to the first core: runs beside one another would share it."""
+    try:
+        lammps = process.Lammps(1)
+    except LammpsMissingError as missing:
+        pytest.skip(str(missing))
+    lammps.wait()
+    ranks = [cores_of(pid) for pid in lammps.processes]
+    lammps.close()
+    assert ranks == [cores_of("self")] * len(ranks)
 
 
 def test_a_close_that_was_interrupted_leaves_alone_what_has_got_the_numbers_of_its_pipes(tmp_path):

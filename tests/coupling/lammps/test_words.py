@@ -6,7 +6,7 @@ import sys
 import numpy as np
 import pytest
 
-from coupling.lammps import LammpsMissingError, process
+from coupling.lammps import LammpsEndedError, LammpsMissingError, process
 from coupling.lammps.law import OVERLAP, MeanContact, dashpot_input, law_words, spring_energy, spring_force
 from coupling.lammps.regions import MovingBody, OutOfPlaneError, check_thickness, pieces_of
 from dem import Ball, Cone, Cylinder, Material
@@ -231,6 +231,57 @@ def test_a_program_that_does_not_run_is_named(broken, monkeypatch, tmp_path):
     monkeypatch.setattr(sys, "executable", str(tmp_path / "python"))
     with pytest.raises(LammpsMissingError, match=rf"{tmp_path / broken} does not run: .*Errno 8.*hedgebed\[lammps\]"):
         process.check_ranks.__wrapped__(2)
+
+
+def test_a_lammps_that_fails_at_once_is_not_called_one_without_granular(monkeypatch, tmp_path):
+    """As where MPI finds no room in the folder of temporary files."""
+    for name in ("lmp", "mpiexec"):
+        (tmp_path / name).write_text("#!/bin/sh\necho OUT-OF-RESOURCE >&2\nexit 1\n")
+        (tmp_path / name).chmod(0o755)
+    monkeypatch.setenv("PATH", f"{tmp_path}:/usr/bin:/bin")
+    monkeypatch.setattr(sys, "executable", str(tmp_path / "python"))
+    with pytest.raises(LammpsMissingError, match=r"lmp does not run: exit status 1: OUT-OF-RESOURCE;"):
+        process.find_lammps()
+
+
+DUMP = "ITEM: TIMESTEP\n7\nITEM: NUMBER OF ATOMS\n2\nITEM: ATOMS id x\n1 0.5\n2 0.25\n"
+
+
+def test_a_dump_that_is_cut_off_anywhere_is_named_and_none_of_its_numbers_is_read(tmp_path):
+    """LAMMPS tells nothing where the disk is full."""
+    path = tmp_path / "near.txt"
+    path.write_text(DUMP)
+    assert process.read_dump(path, 2).tolist() == [[1.0, 0.5], [2.0, 0.25]]
+    for length in range(len(DUMP)):
+        path.write_text(DUMP[:length])
+        with pytest.raises(OSError, match="disk full") as caught:
+            process.read_dump(path, 2)
+        assert caught.value.filename == str(path)
+    path.write_text(DUMP.partition("1 0.5")[0].replace("\n2\n", "\n0\n"))
+    assert process.read_dump(path, 2).shape == (0, 2)
+
+
+@pytest.mark.parametrize(
+    ("written", "ended"),
+    [
+        (b"numbers LammpS Rest", None),
+        (b"", "ERROR: I/O error while writing restart (src/write_restart.cpp:408)"),
+        (b"", "ERROR on proc 0: Cannot open restart file kept.restart: No space left"),
+    ],
+)
+def test_a_restart_file_that_is_cut_off_is_named_and_is_no_checkpoint(written, ended, tmp_path):
+    lammps = object.__new__(process.Lammps)
+    lammps.folder = tmp_path
+
+    def wait():
+        (tmp_path / "kept.restart").write_bytes(written)
+        if ended is not None:
+            raise LammpsEndedError(ended, refused=True)
+
+    lammps.tell, lammps.wait, lammps._kept = lambda commands: None, wait, None
+    with pytest.raises(OSError, match="disk full") as caught:
+        lammps.kept()
+    assert caught.value.filename == str(tmp_path / "kept.restart")
 
 
 def test_a_program_that_does_not_end_is_named():

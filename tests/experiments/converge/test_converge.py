@@ -393,6 +393,7 @@ def test_a_list_that_holds_what_cannot_be_is_refused_with_what_would_do_and_its_
         ({"time_step": 1e-6}, "time_step"),
         ({"life_grain": 0.002}, "life_grain.*0.0012"),
         ({"ground": "spring-damper"}, "ground|model"),
+        ({"set_down": False}, "set_down"),
     ],
 )
 def test_settings_that_no_sweep_can_have_are_refused_by_name(changed, words):

@@ -172,6 +172,7 @@ def test_settings_that_contradict_each_other_are_refused():
         ({"runs": ("a",), "gravity": 1.0}, "gravity"),
         ({"runs": ("a", "a")}, "twice"),
         ({"budget": 60.0, "bed": "mine"}, "bed"),
+        ({"budget": 60.0, "set_down": False}, "set_down"),
         ({"budget": 60.0, "laws": ("springs",)}, "springs"),
         ({"budget": 60.0, "speeds": (0.1,)}, "speeds"),
     ):

@@ -48,6 +48,13 @@ def test_what_is_refused_says_what_the_remedy_costs(given, cost):
         PenetrateSettings(**given)
 
 
+def test_of_a_plate_the_ratio_of_a_ball_is_said_not_to_have_been_seen():
+    """K = K_0 (1 - c d / D) with -6 % to ever finer grains at 8 across (plates-in-sand) is 2 % from 6 to 8 across."""
+    (text,) = resolution_advice(**TIP | {"grain": 0.0024}, flat=True)
+    ratio = (1 + (1 / 0.94 - 1) * 8 / 6) * 0.94
+    assert f"fell by {100 * (1 - 1 / ratio):.0f} %" in text and "8 across" in text and "51 %" in text
+
+
 def test_of_grains_that_stick_no_ratio_of_sand_is_said():
     (text,) = resolution_advice(**TIP | {"grain": 0.0024}, cohesive=True)
     assert "5 grains across" in text and "not known" in text and "%" not in text

@@ -26,6 +26,7 @@ from experiments.penetrate.reference import compare_with
 from experiments.penetrate.settings import PenetrateSettings
 from experiments.penetrate.units import plan_units, shown_units
 from experiments.runs import memory
+from vis.penetrate.answer import answer_tiles
 from vis.pictures.frames import frame_names, read_frames
 
 SAND = Material("sand", 2650.0, 7e10, 0.25, 0.5, 0.5, 0.1)
@@ -98,6 +99,26 @@ def test_the_result_says_what_the_bed_is_and_how_wrong_the_law(fake, tmp_path):
     assert result["departures"]["table"] and result["departures"]["sentences"]
     assert frame_names(folder) == ["seed1-driven-0.2", "seed1-drop-0.1", "seed1-set-down"]
     assert 3 <= len(read_frames(folder, "seed1-driven-0.2")) <= 7
+
+
+@pytest.mark.parametrize("drops", [(0.1,), ()])
+def test_without_set_downs_there_is_no_sinkage_and_the_rest_is_the_same(fake, tmp_path, drops):
+    """Nor is the load of a run without drops refused, said to sink away, or what the grains are made stiff for."""
+    dropped = {"drop_speeds": drops, "other_drop_speeds": drops, "seeds": (1, 2)}
+    for name, own in (("with", {}), ("without", {"set_down": False})):
+        penetrate.run(PenetrateSettings(**QUICK | dropped | own), tmp_path / name)
+    whole, found = (json.loads((tmp_path / name / "result.json").read_text()) for name in ("with", "without"))
+    assert {run["kind"] for run in found["runs"]} == {"driven", *(["drop"] if drops else [])}
+    assert found["quantities"]["sinkage_dem"]["value"] is None and "rest" not in found
+    for name in ("stiffness", "damping", "drag_gap"):
+        assert found["quantities"][name] == whole["quantities"][name], name
+    assert set(found["warnings"]) <= set(whole["warnings"])
+    shown = [tile.label for tile in answer_tiles(found)]
+    assert not [label for label in shown if "inkage" in label or "rest" in label]
+    if not drops:  # no load presses on these grains
+        heavy = PenetrateSettings(**QUICK | dropped | {"set_down": False, "load": 50.0})
+        assert beds.choose_softness(heavy).young == beds.choose_softness(heavy.model_copy(update={"load": 0.4})).young
+        penetrate.check(heavy)
 
 
 def test_a_run_that_died_goes_on_to_the_same_bits(fake, tmp_path, monkeypatch):

@@ -164,8 +164,9 @@ def test_two_ends_have_one_unit(ends, words):
     assert in_words(*ends, "m").split(" to ") == words.split("|")
 
 
-def test_the_size_of_real_grains_is_that_of_the_material(tmp_path):
+def test_the_size_of_real_grains_is_that_of_the_material(tmp_path, monkeypatch):
     """0.2 mm of the sand that ships; of a file what it states, else 0: an upper bound of the error."""
+    read, read_text = [], Path.read_text
     stated, silent, wrong = (tmp_path / f"{name}.toml" for name in ("stated", "silent", "wrong"))
     lines = ['format = "hedgebed-material/1"', 'name = "mine"', "density = 2900.0", "young = 70e9", "poisson = 0.25"]
     lines += ["friction = 0.5", "restitution = 0.5"]
@@ -176,6 +177,11 @@ def test_the_size_of_real_grains_is_that_of_the_material(tmp_path):
     assert read_material(stated) == read_material(silent)  # the simulated grains are the same
     with pytest.raises(ValueError, match=r"real_grain = 0\.0 must be"):
         read_material(wrong)
+    monkeypatch.setattr(Path, "read_text", lambda path, **options: read.append(path) or read_text(path, **options))
+    assert real_grain_of(stated) == 3e-4 and read == [stated]  # once
+    bed = {"grain": 0.003, "material": "mine"}
+    assert "10 times larger" in summary._caveat({"bed": bed | {"real_grain": 3e-4}}, {})
+    assert not summary._caveat({"bed": bed | {"real_grain": None}}, {})
     for path, real in ((stated, 3e-4), (silent, 0.0)):
         settings = PenetrateSettings(material=str(path), grain=0.004, allow_coarse=True)
         findings = SimpleNamespace(settings=settings, beds={}, sinkages=lambda beds: [0.001, 0.0011])

@@ -93,6 +93,29 @@ def test_runs_come_in_their_order_each_once_and_what_is_done_comes_first(tmp_pat
     assert len([words for words in said if str(lost) in words and "done again" in words]) == 1
 
 
+def test_shares_of_runs_that_are_computed_together_are_one_progress_by_their_costs(tmp_path, monkeypatch):
+    """Two processes tell how far they are; one run of three has failed, and its cost counts as done."""
+    planned = [one for cost in (6.0, 3.0, 1.0) for one in tumbles(tmp_path, [0.1 + 0.01 * cost], cost)]
+    first, second, third = (one.task.name for one in planned)
+    progress, said, shares = Progress(), [], []
+    monkeypatch.setattr(progress, "message", said.append)
+    monkeypatch.setattr(together, "_TOLD_EVERY", 0.0)
+
+    def computed(tasks, *, on_outcome, on_share, **given):
+        assert [task.name for task in tasks] == [first, second, third]
+        on_outcome(Outcome(third, fault="wheel lost"))
+        for name, share in ((first, 0.5), (second, 0.25), (first, 0.75), (third, 0.5)):
+            on_share(name, share)
+            shares.append(progress.stage_fraction)
+
+    monkeypatch.setattr(together, "carry_out_all", computed)
+    run_all(planned, where=Where(workers=2), progress=progress)
+    assert shares == pytest.approx([0.4, 0.475, 0.625, 0.625])
+    over, *each = said[-1].split("; ")
+    assert "1 of 3 " in over and "1 of them" in over
+    assert sorted(one.split(": ") for one in each) == [["torque 0.13", "25 %"], ["torque 0.16", "75 %"]]
+
+
 @dataclass(frozen=True)
 class Twice:
     """The torque of the run, doubled, in a file of its folder."""

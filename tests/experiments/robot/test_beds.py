@@ -14,6 +14,7 @@ from experiments.grains.bed_result import sides_warning, sleep_words
 from experiments.grains.on_bed import PlatformOnBed
 from experiments.platform.law_spread import moved
 from experiments.robot import experiment as robot
+from experiments.robot.beds import carry_out_beds
 from experiments.robot.feet import heights_of
 from experiments.robot.flight import find_flights
 from experiments.robot.on_grains import RobotFollowed, RobotOnBed
@@ -24,6 +25,7 @@ from experiments.robot.sure import ANSWER, sure_of_law
 from experiments.runs.folder import RunFolder, write_series
 from experiments.runs.progress import Progress
 from experiments.runs.result import Result
+from experiments.runs.whole_runs import draw_report
 from rigid.ground.laws import find_law
 from rigid.ground_file import GroundFile
 from rigid.intervals import NORMAL
@@ -127,6 +129,28 @@ def test_several_beds_have_means_with_students_interval_and_a_stopped_run_comput
 
 
 @pytest.mark.long
+def test_the_report_of_each_bed_is_in_the_time_to_go(tmp_path, monkeypatch):
+    """45 s each, with pictures of grains."""
+    planned, begun = {}, []
+
+    class Plan(Progress):
+        def plan(self, costs, **given):
+            planned.update(given["seconds"])
+
+        def stage(self, name, total=None):
+            begun.append(name)
+
+    made = law_in_place_of_grains([])
+    monkeypatch.setattr(
+        RobotOnBed, "carry_out",
+        lambda self, folder, progress: (made(self, folder, progress), draw_report(folder, progress)),
+    )  # fmt: skip
+    monkeypatch.setattr("experiments.runs.whole_runs.write_report", lambda *given: None)
+    settings = RobotSettings(**ON_BED, seeds=(1, 3), controller=f"{EXAMPLES / 'mujoco-hopper' / 'hop.py'}:control")
+    carry_out_beds(settings, plan_robot(settings), RunFolder.create(tmp_path / "run", "mujoco", settings), Plan())
+    assert planned == {"report, seed 1": 45.0, "report, seed 3": 45.0, "report": 5.0} and begun == list(planned)
+
+
 def test_two_beds_of_grains_have_an_interval_that_holds_both(tmp_path, monkeypatch):
     monkeypatch.setattr(RobotOnBed, "prepare", lambda self, *_: grain_bed(young=5e6 * self.settings.seed))
     monkeypatch.setattr(RobotOnBed, "check", lambda _: None)

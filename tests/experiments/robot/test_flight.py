@@ -12,6 +12,7 @@ from experiments.robot.on_grains import RobotFollowed
 from experiments.robot.plan import plan_robot
 from experiments.robot.result import conclude
 from experiments.robot.settings import RobotSettings
+from vis.robot.answer import DISTANCE, answer_tiles
 
 pytest.importorskip("mujoco", reason="mujoco is not installed: pip install 'hedgebed[mujoco]'")
 
@@ -82,14 +83,35 @@ def test_a_flight_on_a_rail_with_damping_goes_on_as_mujoco_has_it(tmp_path):
     robot = MujocoRobot(str(tmp_path / "rail.xml"), feet=["foot"])
     robot.data.qvel[0] = v
     robot.start()
-    rise, fall = robot.onward()
+    rise, fall, along = robot.onward()
+    assert tuple(along) == (0.0, 0.0) and not robot.travels
     assert rise == pytest.approx(m * v / c - (m / c) ** 2 * g * np.log(1 + c * v / (m * g)), rel=2e-3)
     assert v**2 / (2 * g) > 1.4 * rise
     assert robot.data.time == 0.0 and robot.data.qvel[0] == v and fall > 0
     assert robot.onward(most_steps=100) is None
     robot.data.qpos[0], robot.data.qvel[0] = -0.01, -0.1  # it falls in its crater, below the surface already
     robot.start()
-    assert robot.onward() == (0.0, pytest.approx(1e-3))  # one step
+    assert robot.onward()[:2] == (0.0, pytest.approx(1e-3))  # one step
+
+
+def test_the_distance_of_a_hop_is_that_of_its_longest_flight_also_where_the_run_ends_in_it(tmp_path):
+    """In flight the plate goes v_x t; a longer run has the whole flight, a shorter one is continued to the same."""
+    model = LANDER.replace("<freejoint/>", """<joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 0 1"/>""")
+    (tmp_path / "sled.xml").write_text(model, encoding="utf-8")
+    (tmp_path / "push.py").write_text(
+        "def control(model, data):\n    data.qfrc_applied[0] = 6.0 if data.time < 0.05 else 0.0\n", encoding="utf-8"
+    )
+    given = BOUNCE | {"controller": f"{tmp_path}/push.py:control", "mu_s": 0.0, "mu_d": 0.0}
+    run, whole = concluded(str(tmp_path / "sled.xml"), tmp_path, **given, duration=0.24)
+    _, short = concluded(str(tmp_path / "sled.xml"), tmp_path, **given, duration=0.15)
+    speed = np.diff(run.columns["x"])[-1] / run.macro_step
+    assert speed == pytest.approx(6.0 * 0.05 / 1.5, rel=0.05)  # a push may last one step of MuJoCo longer
+    distance = whole.quantities["hop_distance"].value
+    assert distance == pytest.approx(speed * whole.quantities["longest_flight"].value, rel=0.02)
+    assert short.quantities["hop_distance"].value == pytest.approx(distance, rel=0.02)
+    assert [said for said in whole["departures"]["sentences"] if f"{1e3 * distance:.0f} mm along" in said]
+    tiles = [tile.label for tile in answer_tiles(whole)]
+    assert len(tiles) == 6 and DISTANCE[0] in tiles
 
 
 def test_a_robot_that_is_still_falling_at_the_end_is_told_of_it_before_and_a_run_of_that_length_touches(

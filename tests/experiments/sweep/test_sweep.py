@@ -16,7 +16,7 @@ import pytest
 from experiments.cli.main import main
 from experiments.pool import tasks
 from experiments.runs.folder import RunFolder
-from experiments.sweep import Settings, design, result
+from experiments.sweep import Settings, design, experiment, result
 from rigid.series import read_series
 from vis.report import write_report
 
@@ -313,6 +313,15 @@ def test_what_is_not_installed_is_named_before_any_run(monkeypatch, capsys):
     assert main(["sweep", "sweep", "--workers", "2"]) == 2
     assert "workers = 2" in (said := capsys.readouterr().err) and "hedgebed[sweep]" in said
     assert main(["sweep", "sweep", "--scheduler", "tcp://nowhere:1"]) == 2
+    assert "hedgebed[sweep]" in capsys.readouterr().err
+
+
+def test_without_dask_the_runs_are_made_one_after_the_other_and_a_message_says_so(tmp_path, monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    monkeypatch.setattr(experiment, "cores_there", lambda: 2)
+    few = ["--experiment", "tumble", "--fixed", "duration=0.1", "--over", "torque=[0.15, 0.2]", "--out", "swept"]
+    assert main(["sweep", *few]) == 0
+    assert len(table(tmp_path / "swept")["run"]) == 2
     assert "hedgebed[sweep]" in capsys.readouterr().err
 
 
