@@ -354,8 +354,30 @@ def _numbers(diagnosis: Result) -> list[Block]:
     added = table_of(("effect", "parameter", "value", say("in_95"), "unit"), effects, title="Added effects")
     head = ("parameter", "before", say("in_95"), "after", say("in_95"), "unit")
     fitted = table_of(head, base, title="The base model's parameters")
+    fitted += _stated(diagnosis)
     blocks = [*_sizes(diagnosis), *added, *_equations(diagnosis), *fitted] if effects else fitted
     return [*blocks, text(say("errors_of_fit"), small=True)] if blocks else []
+
+
+def _stated(diagnosis: Result) -> list[Block]:
+    """What campaign.toml states as known, what the trials give without it, and the difference."""
+    rows = []
+    for row in diagnosis.get("stated", []):
+        cells = [row["parameter"], unit_text(row["stated"]["unit"])]
+        for key in ("stated", "alone", "difference"):
+            entry = row[key]
+            cells += [say("not_determined"), _DASH] if entry is None else _interval(entry)
+        rows.append((*cells, {True: "yes", False: "no", None: _DASH}[row["agrees"]]))
+    numbers = [part for name in ("stated", "trials alone", "difference") for part in (name, say("in_95"))]
+    head = ("parameter", "unit", *numbers, "agree")
+    return table_of(head, rows, title=say("stated"))
+
+
+def _interval(entry: Result) -> list[str]:
+    """A number and half of its 95 % interval."""
+    half = half_of(entry)
+    error = _DASH if half is None else short(half, 2) if abs(entry["value"]) < half else beside(half, half)
+    return [_value(entry), error]
 
 
 def _equations(diagnosis: Result) -> list[Block]:
