@@ -51,6 +51,7 @@ def write_diagnosis_report(report: Report) -> Path:
         Section("Remaining misfit", [*left, *drawn["latent"]]),
         Section("Where the base model fails", [*([listing(departures)] if departures else []), *_where(diagnosis)]),
         Section("Candidates", [*drawn["evidence"], *_evidence(diagnosis)]),
+        Section(say("all_forms"), _tried(diagnosis)),
         Section("What these trials can distinguish", _distinguished(diagnosis)),
         Section("The next experiment", [text(following)] if following else []),
         Section("Numbers", _numbers(diagnosis)),
@@ -286,6 +287,21 @@ def _forms(diagnosis: Result, candidates: Sequence[str]) -> list[Block]:
         id for id in meanings if any(id.partition(":")[2] in one and id.partition(":")[0] in one for one in candidates)
     ]
     return [text(say("forms"), small=True), listing([f"{id}: {meanings[id]}" for id in shown])] if shown else []
+
+
+def _tried(diagnosis: Result) -> list[Block]:
+    """Every candidate that was fitted, in each of its forms, and what the forms are."""
+    rows = [
+        (row["candidate"], f"{row['score']:.1f}".replace("-", "\N{MINUS SIGN}"),
+         _DASH if row.get("left") is None else short(row["left"], 3),
+         _DASH if row.get("closes") is None else closed_share(row["closes"]))
+        for row in diagnosis.get("evidence", [])
+    ]  # fmt: skip
+    count = len({part for row in rows for part in row[0].split(" + ")})
+    head = ("candidate (effect:form)", "evidence over the base model [nats]", "excess", "excess removed")
+    meanings = diagnosis.get("forms_tried", {})
+    told = [listing([f"{id}: {words}" for id, words in meanings.items()])] if rows and meanings else []
+    return [*table_of(head, rows, title=say("tried", candidates=len(rows), forms=count)), *told]
 
 
 def _sizes(diagnosis: Result) -> list[Block]:

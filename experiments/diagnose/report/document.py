@@ -115,6 +115,7 @@ def document(found: Diagnosis, near: Sequence[Near] | None = None) -> dict[str, 
     diagnosis["equivalence"] = _equivalence(found)
     diagnosis["candidates"] = candidate_rows(diagnosis)
     diagnosis["forms"] = _forms(diagnosis["candidates"])
+    diagnosis["forms_tried"] = _forms(diagnosis["evidence"])
     diagnosis["noise"] = _noise(found)
     diagnosis["model_std"] = dict(found.model_std)
     diagnosis["has_replicates"] = has_replicates(found.problem.trials)
