@@ -12,6 +12,7 @@ from vis.diagnose.held_out import worsens_held_out
 from vis.diagnose.usable import gap_in_scatter
 from vis.page.numbers import fitted, foldable
 
+from .machine import machine_sentences
 from .sentences import (
     behind_words,
     remark_sentences,
@@ -115,8 +116,9 @@ def summary_sentences(diagnosis: Mapping[str, Any]) -> list[str]:
     aside = list(dict.fromkeys(row["trial"] for row in diagnosis.get("set_aside", [])))
     apart = [say("took_no_part", trials=", ".join(aside))] if aside else []
     use = [*use_sentences(diagnosis), *stated_sentences(diagnosis), *law_sentences(diagnosis)]
-    doubts = [*_doubts(diagnosis), *_stated_far(diagnosis), *remark_sentences(diagnosis), *peak_sentences(diagnosis),
-              *worse_sentences(diagnosis), *neutral_sentences(diagnosis), *_no_replicates(diagnosis)]  # fmt: skip
+    doubts = [*_doubts(diagnosis), *_stated_far(diagnosis), *machine_sentences(diagnosis),
+              *remark_sentences(diagnosis), *peak_sentences(diagnosis), *worse_sentences(diagnosis),
+              *neutral_sentences(diagnosis), *_no_replicates(diagnosis)]  # fmt: skip
     return [*doubts, *use, *apart, *first, *scatter_sentence(diagnosis), *near_model_sentences(diagnosis),
             f"Next experiment: {ask}"]  # fmt: skip
 
