@@ -2,7 +2,7 @@
 
 A bed that is prepared anew has another strength. A stiffness of unloading, or the depth of a layer, that stays the same
 to within its errors is then doubtful. Each push is fitted alone, with its own K and that number, all others held. No
-scatter of the number may be seen, one as large as that of K must be excluded, and one stiffness of unloading over K too.
+scatter of the number may be seen, one as large as that of K is excluded, so is an unloading that follows K.
 """
 
 import math

@@ -53,8 +53,11 @@ def beside_stated(found: Diagnosis) -> list[Beside]:
 
 
 def without_prior(joint: Estimated, stated: Estimated, *, share: float) -> Estimated | None:
-    """A number by the data alone, from the `joint` one and the `stated` one that is in it with this `share`; None where
-    the data do not determine it. Where the error rests on few beds, its degrees of freedom are those of that part."""
+    """A number by the data alone: the `joint` one without the `stated` one, which is in it with this `share`.
+
+    None where the data do not determine it. Where the error rests on few beds, its degrees of freedom are those of that
+    part.
+    """
     std, prior = joint["std"], stated["std"]
     if std is None or prior is None or share > _PRIOR or std**2 >= _PRIOR * prior**2:
         return None

@@ -12,8 +12,10 @@ __all__ = ["machine_sentences"]
 
 
 def machine_sentences(diagnosis: Mapping[str, Any]) -> list[str]:
-    """That the stiffness of unloading, or the depth of a layer, is the same in all beds although K is not; what that
-    means for K, and which experiment shows it. None where the pushes do not show it."""
+    """That the stiffness of unloading, or the depth of a layer, is the same in all beds although K is not.
+
+    With what that means for K, and the experiment that shows it. None where the pushes do not show it.
+    """
     return [_words(row) for row in diagnosis.get("same_in_all_beds", [])]
 
 
