@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -77,6 +78,25 @@ def test_the_report_of_an_unknown_has_every_part_and_names_columns_in_words(tmp_
         assert part in page
     figures = {path.stem for path in (tmp_path / "figures").iterdir()}
     assert figures == {"trajectories", "residuals", "evidence", "latent"}
+
+
+def test_every_form_that_was_tried_stands_with_its_evidence_in_a_folded_table(tmp_path):
+    write_folder(tmp_path, trials={"a": 3.0, "d": 2.0})
+    said = json.loads((tmp_path / "diagnosis.json").read_text())
+    pair = "layering:slope + adhesion:held"
+    said["evidence"] += [
+        {"candidate": "layering:step", "effects": ["layering"], "score": -1.25, "left": 7.0, "closes": 0.125},
+        {"candidate": pair, "effects": ["layering", "adhesion"], "score": -2.5, "left": 1.0, "closes": 0.5},
+    ]  # fmt: skip
+    said["forms_tried"] = {"layering:step": "a step of the force"}
+    (tmp_path / "diagnosis.json").write_text(json.dumps(said))
+    page = write_diagnosis_report(tmp_path).read_text(encoding="utf-8")
+    (part,) = [part for part in re.findall("<details>.*?</details>", page, re.DOTALL) if ">All forms" in part]
+    cells = re.findall("<td[^>]*>(.*?)</td>", part)
+    minus = "\N{MINUS SIGN}"
+    assert cells == ["layering:slope", "2.0", "2", "\N{EN DASH}", "layering:step", f"{minus}1.2", "7", "12 %",
+                     pair, f"{minus}2.5", "1", "50 %"]  # fmt: skip
+    assert all(words in part for words in ("3 candidates", "3 forms", "layering:step: a"))
 
 
 def test_what_replicates_differ_by_stands_beside_the_gap_and_behind_what_is_left(tmp_path):

@@ -51,6 +51,7 @@ def write_diagnosis_report(report: Report) -> Path:
         Section("Remaining misfit", [*left, *drawn["latent"]]),
         Section("Where the base model fails", [*([listing(departures)] if departures else []), *_where(diagnosis)]),
         Section("Candidates", [*drawn["evidence"], *_evidence(diagnosis)]),
+        Section(say("all_forms"), _tried(diagnosis)),
         Section("What these trials can distinguish", _distinguished(diagnosis)),
         Section("The next experiment", [text(following)] if following else []),
         Section("Numbers", _numbers(diagnosis)),
@@ -292,6 +293,21 @@ def _forms(diagnosis: Result, candidates: Sequence[str]) -> list[Block]:
     return [text(say("forms"), small=True), listing([f"{id}: {meanings[id]}" for id in shown])] if shown else []
 
 
+def _tried(diagnosis: Result) -> list[Block]:
+    """Every candidate that was fitted, in each of its forms, and what the forms are."""
+    rows = [
+        (row["candidate"], f"{row['score']:.1f}".replace("-", "\N{MINUS SIGN}"),
+         _DASH if row.get("left") is None else short(row["left"], 3),
+         _DASH if row.get("closes") is None else closed_share(row["closes"]))
+        for row in diagnosis.get("evidence", [])
+    ]  # fmt: skip
+    count = len({part for row in rows for part in row[0].split(" + ")})
+    head = ("candidate (effect:form)", "evidence over the base model [nats]", "excess", "excess removed")
+    meanings = diagnosis.get("forms_tried", {})
+    told = [listing([f"{id}: {words}" for id, words in meanings.items()])] if rows and meanings else []
+    return [*table_of(head, rows, title=say("tried", candidates=len(rows), forms=count)), *told]
+
+
 def _sizes(diagnosis: Result) -> list[Block]:
     rows = [
         (size["effect"], short(size["signature"], 2), size["channel"], f"{short(size['rms'], 2)} {size['unit']}",
@@ -358,8 +374,30 @@ def _numbers(diagnosis: Result) -> list[Block]:
     added = table_of(("effect", "parameter", "value", say("in_95"), "unit"), effects, title="Added effects")
     head = ("parameter", "before", say("in_95"), "after", say("in_95"), "unit")
     fitted = table_of(head, base, title="The base model's parameters")
+    fitted += _stated(diagnosis)
     blocks = [*_sizes(diagnosis), *added, *_equations(diagnosis), *fitted] if effects else fitted
     return [*blocks, text(say("errors_of_fit"), small=True)] if blocks else []
+
+
+def _stated(diagnosis: Result) -> list[Block]:
+    """What campaign.toml states as known, what the trials give without it, and the difference."""
+    rows = []
+    for row in diagnosis.get("stated", []):
+        cells = [row["parameter"], unit_text(row["stated"]["unit"])]
+        for key in ("stated", "alone", "difference"):
+            entry = row[key]
+            cells += [say("not_determined"), _DASH] if entry is None else _interval(entry)
+        rows.append((*cells, {True: "yes", False: "no", None: _DASH}[row["agrees"]]))
+    numbers = [part for name in ("stated", "trials alone", "difference") for part in (name, say("in_95"))]
+    head = ("parameter", "unit", *numbers, "agree")
+    return table_of(head, rows, title=say("stated"))
+
+
+def _interval(entry: Result) -> list[str]:
+    """A number and half of its 95 % interval."""
+    half = half_of(entry)
+    error = _DASH if half is None else short(half, 2) if abs(entry["value"]) < half else beside(half, half)
+    return [_value(entry), error]
 
 
 def _equations(diagnosis: Result) -> list[Block]:

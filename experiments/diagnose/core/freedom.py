@@ -9,12 +9,20 @@ import math
 
 from experiments.diagnose.fit.evidence import inflation
 from experiments.diagnose.fit.fitting import Fit
-from experiments.diagnose.fit.problem import Array
+from experiments.diagnose.fit.problem import Array, Estimate
 from rigid.intervals import joint_freedom
 
-__all__ = ["Freedoms"]
+__all__ = ["Freedoms", "from_beds"]
 
 _MANY = 1e3  # degrees of freedom from which on Student's t is that of the normal distribution to three digits
+
+
+def from_beds(found: Estimate, covariance: Array, inflation: float) -> Array | None:
+    """What not knowing the beds adds to the covariance of a fit, shape [p, p]; None where their scatter was not found
+    from trials. `covariance`: with this `inflation`."""
+    stated = found.model.problem.known_std  # what the readings themselves show
+    own = {p.name for p in found.model.scatter if p.kind not in stated}
+    return covariance - found.covariance(inflation=inflation, known=own) if own else None
 
 
 class Freedoms:
@@ -24,12 +32,8 @@ class Freedoms:
     """
 
     def __init__(self, found: Fit, covariance: Array, freedom: float | None) -> None:
-        stated = found.model.problem.known_std  # what the readings themselves show
-        own = {p.name for p in found.model.scatter if p.kind not in stated}
-        self._freedom = freedom if own and freedom else None
-        self._beds: Array | None = None  # what not knowing the beds adds to the covariance
-        if self._freedom is not None:
-            self._beds = covariance - found.covariance(inflation=inflation(found), known=own)
+        self._freedom = freedom or None
+        self._beds = from_beds(found, covariance, inflation(found)) if freedom else None
 
     def of(self, slope: Array, std: float | None) -> float | None:
         """Of a number with this standard error. `slope`: its derivatives by the parameters, shape [p]. None where its

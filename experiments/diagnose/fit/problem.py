@@ -19,7 +19,7 @@ white noise, and slow misfit stands in the first modes.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import MappingProxyType
@@ -137,8 +137,8 @@ class Estimate(Protocol):
     def free(self) -> NDArray[np.bool_]:
         """Which of them no bound holds, shape [p]."""
 
-    def covariance(self, *, inflation: float = 1.0) -> Array:
-        """Of the numbers, in their units, shape [p, p]; `inflation`: by how much the data are noisier than stated."""
+    def covariance(self, *, inflation: float = 1.0, known: Collection[str] = ()) -> Array:
+        """Of the numbers, in their units, shape [p, p]. Data are noisier by `inflation`, the names `known` exact."""
 
 
 class Problem(Protocol):

@@ -44,8 +44,9 @@ class Planned:
     tried: int  # trials of the search
     apart: Mapping[str, float] | None = None
     """Where the two predictions differ most over their errors: ``depth_m``, ``speed_m_s`` (negative on the way back),
-    ``one_N`` and ``other_N`` with ``one_std_N`` and ``other_std_N``, and ``noise_N`` of one reading. ``one_beds_N``:
-    standard deviation by other beds; ``one_peak_N``: the peak force, with the same. `planned_pushes` adds the beds to
-    the errors and their ``one_freedom``; ``model_std_N``, the error of their difference by both models, and
-    ``scatter_N``, of a reading in another bed."""
+    ``one_N`` and ``other_N`` with ``one_std_N`` and ``other_std_N``, and ``noise_N`` of one reading. ``one_rests_N``:
+    the part of that error that rests on the scatter of the campaign's beds. ``one_beds_N``: standard deviation by other
+    beds; ``one_peak_N``: the peak force, with the same. `planned_pushes` adds the beds to the errors and their
+    ``one_freedom``; ``model_std_N``, the error of their difference by both models, ``scatter_N``, of a reading in
+    another bed, the parts ``model_rests_N`` and ``scatter_rests_N`` of both, and the ``freedom`` of the scatter."""
     compared: tuple["Planned", ...] = field(default=(), repr=False)  # all of the search

@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from experiments.diagnose.core.freedom import from_beds
 from experiments.diagnose.fit.problem import Array, Estimate, Form, Values
 from experiments.diagnose.fit.trials import Planned
 
@@ -52,11 +53,11 @@ def best_push(
     for diameter, speed, part, hold, returns in itertools.product(diameters, paces, _DEPTHS, _HOLDS, (False, True)):
         time, z, v = _path(speed, part * depth, hold, returns)
         d, noise = np.zeros(len(time)), np.eye(len(time))
-        forces: list[tuple[Array, Array, Array]] = []
+        forces: list[tuple[Array, ...]] = []
         for sign, fit, factor in ((1.0, one, inflation[0]), (-1.0, other, inflation[1])):
-            force, errors = _predicted(fit, predict, factor, diameter, time, z, v)
+            force, errors, rests = _predicted(fit, predict, factor, diameter, time, z, v)
             beds = _of_beds(fit, predict, diameter, time, z, v)
-            forces.append((force, np.linalg.norm(errors, axis=1), beds))
+            forces.append((force, np.linalg.norm(errors, axis=1), rests, beds))
             weight = np.sqrt(rows / _ROWS) / std
             d += sign * weight * force
             noise += weight**2 * (errors @ errors.T)
@@ -69,17 +70,18 @@ def best_push(
     return replace(max(found, key=lambda push: push.nats), compared=tuple(found))
 
 
-def _apart(z: Array, v: Array, forces: Sequence[tuple[Array, Array, Array]], std: float) -> dict[str, float]:
-    """The reading at which two predictions, each a force with its standard error and its scatter in other beds [N],
-    differ most over their errors, below the depth at which its zero decides; and the peak force of each."""
-    (one, one_std, _), (other, other_std, _) = forces
+def _apart(z: Array, v: Array, forces: Sequence[tuple[Array, ...]], std: float) -> dict[str, float]:
+    """The reading at which two predictions, each a force with its standard error, the part of that which rests on few
+    beds, and its scatter in other beds [N], differ most over their errors, below the depth at which its zero decides;
+    and the peak force of each."""
+    (one, one_std, *_), (other, other_std, *_) = forces
     apart = np.abs(one - other) / np.sqrt(one_std**2 + other_std**2 + std**2)
     at = int(np.argmax(np.where(z >= _KNOWN * z.max(), apart, -1.0)))
     found = {"depth_m": float(z[at]), "speed_m_s": float(v[at]), "noise_N": std}
     for key, columns in zip(("one", "other"), forces, strict=True):
         for name, row in ((key, at), (f"{key}_peak", int(np.argmax(columns[0])))):
-            force, fit_std, beds = (float(column[row]) for column in columns)
-            found |= {f"{name}_N": force, f"{name}_std_N": fit_std, f"{name}_beds_N": beds}
+            keys = (f"{name}_{part}N" for part in ("", "std_", "rests_", "beds_"))
+            found |= zip(keys, (float(column[row]) for column in columns), strict=True)
     return found
 
 
@@ -120,8 +122,9 @@ def _of_beds(fit: Estimate, predict: Predict, diameter: float, time: Array, z: A
 
 def _predicted(
     fit: Estimate, predict: Predict, inflation: float, diameter: float, time: Array, z: Array, v: Array
-) -> tuple[Array, Array]:
-    """Forces [N] and a factor of the covariance of their errors, shape [n, p]."""
+) -> tuple[Array, Array, Array]:
+    """Forces [N], a factor of the covariance of their errors, shape [n, p], and the part of the standard errors that
+    rests on the scatter of the campaign's beds, shape [n]."""
     model = fit.model
     shared = [k for k, p in enumerate(model.parameters) if p.trial is None and fit.free[k]]
     points: list[tuple[Values, Sequence[Form]]] = [(fit.values, model.forms)]
@@ -132,6 +135,8 @@ def _predicted(
         points.append(({**fit.values, p.name: fit.values[p.name] + steps[-1]}, model.forms))
     forces = predict(points, diameter, time, z, v)
     slopes = (forces[1:] - forces[0]).T / np.array(steps)
-    covariance = fit.covariance(inflation=inflation)[np.ix_(shared, shared)]
-    size, axes = np.linalg.eigh(covariance)
-    return forces[0], slopes @ (axes * np.sqrt(np.maximum(size, 0.0)))
+    whole, own = fit.covariance(inflation=inflation), np.ix_(shared, shared)
+    size, axes = np.linalg.eigh(whole[own])
+    beds = from_beds(fit, whole, inflation)
+    part = np.zeros(len(time)) if beds is None else np.einsum("ij,jk,ik->i", slopes, beds[own], slopes)
+    return forces[0], slopes @ (axes * np.sqrt(np.maximum(size, 0.0))), np.sqrt(np.maximum(part, 0.0))

@@ -25,7 +25,9 @@ from experiments.diagnose.core.effect_texts import SYMBOLS, equations_of, form_m
 from experiments.diagnose.core.near import Near, near_models, nearest_each
 from experiments.diagnose.core.outcome import Diagnosis, Estimated
 from experiments.diagnose.core.rivals import LEAD, Rival
+from experiments.diagnose.core.same_in_all import same_in_all_beds
 from experiments.diagnose.core.scatter_gap import scatter_std
+from experiments.diagnose.core.stated import beside_stated
 from experiments.diagnose.core.too_noisy import noise_found
 from experiments.diagnose.fit.evidence import excess, held_out_fit
 from experiments.diagnose.fit.fitting import Fit, fit
@@ -100,6 +102,8 @@ def document(found: Diagnosis, near: Sequence[Near] | None = None) -> dict[str, 
         for one in (nearest_each(found) if near is None else near)
     ]  # fmt: skip
     diagnosis["base"] = {"before": _base(found, found.base), "after": _base(found, found.best)}
+    diagnosis["same_in_all_beds"] = [asdict(one) for one in same_in_all_beds(found)]
+    diagnosis["stated"] = [one.as_json() for one in beside_stated(found)]
     gates = {"before": found.gate_before, "after": found.gate_after, "held_out": found.gate_held_out}
     diagnosis["gate"] = {stage: asdict(gate) for stage, gate in gates.items() if gate is not None}
     bounds = {"before": found.bounds_before, "after": found.bounds_after}
@@ -113,6 +117,7 @@ def document(found: Diagnosis, near: Sequence[Near] | None = None) -> dict[str, 
     diagnosis["equivalence"] = _equivalence(found)
     diagnosis["candidates"] = candidate_rows(diagnosis)
     diagnosis["forms"] = _forms(diagnosis["candidates"])
+    diagnosis["forms_tried"] = _forms(diagnosis["evidence"])
     diagnosis["noise"] = _noise(found)
     diagnosis["model_std"] = dict(found.model_std)
     diagnosis["has_replicates"] = has_replicates(found.problem.trials)

@@ -12,6 +12,7 @@ from vis.diagnose.held_out import worsens_held_out
 from vis.diagnose.usable import gap_in_scatter
 from vis.page.numbers import fitted, foldable
 
+from .machine import machine_sentences
 from .sentences import (
     behind_words,
     remark_sentences,
@@ -29,6 +30,7 @@ from .to_use import (
     neutral_sentences,
     number_words,
     peak_sentences,
+    stated_sentences,
     use_sentences,
 )
 
@@ -113,9 +115,10 @@ def summary_sentences(diagnosis: Mapping[str, Any]) -> list[str]:
         first += [*_residue(diagnosis), *_allowed(diagnosis)]
     aside = list(dict.fromkeys(row["trial"] for row in diagnosis.get("set_aside", [])))
     apart = [say("took_no_part", trials=", ".join(aside))] if aside else []
-    use = [*use_sentences(diagnosis), *law_sentences(diagnosis)]
-    doubts = [*_doubts(diagnosis), *_stated_far(diagnosis), *remark_sentences(diagnosis), *peak_sentences(diagnosis),
-              *worse_sentences(diagnosis), *neutral_sentences(diagnosis), *_no_replicates(diagnosis)]  # fmt: skip
+    use = [*use_sentences(diagnosis), *stated_sentences(diagnosis), *law_sentences(diagnosis)]
+    doubts = [*_doubts(diagnosis), *_stated_far(diagnosis), *machine_sentences(diagnosis),
+              *remark_sentences(diagnosis), *peak_sentences(diagnosis), *worse_sentences(diagnosis),
+              *neutral_sentences(diagnosis), *_no_replicates(diagnosis)]  # fmt: skip
     return [*doubts, *use, *apart, *first, *scatter_sentence(diagnosis), *near_model_sentences(diagnosis),
             f"Next experiment: {ask}"]  # fmt: skip
 

@@ -14,12 +14,13 @@ from vis.page.numbers import fitted, foldable
 from .sentences import say
 
 __all__ = ["SERIES", "law_sentences", "near_model_sentences", "neutral_sentences", "number_words", "peak_sentences",
-           "unloading_sentences", "use_sentences"]  # fmt: skip
+           "stated_sentences", "unloading_sentences", "use_sentences"]  # fmt: skip
 
 SERIES = {"count": 84, "middle": 0.3, "most": 3.3}
 """By how much K of campaigns without an effect was below the ground's [%]: docs/results/diagnose-second, pushes."""
 _STRONG, _PAIRS = 0.9, 3  # correlation from which on it is reported, and of how many pairs
 _REFERENCE = re.compile(r"\bD\b")  # the typical depth in an equation
+_STATED = 4  # numbers that were stated in the sentence; more are in the table
 _SHOWN = 4  # diameters whose K is in the sentence; of more it is in the table
 
 
@@ -60,6 +61,32 @@ def _in_series(covered: Mapping[str, Any]) -> str:
     if not covered:
         return ""
     return f" {say('in_series', **SERIES)}" if frame is None else f" {say('at_the_tip', frame=frame)}"
+
+
+def stated_sentences(diagnosis: Mapping[str, Any]) -> list[str]:
+    """K and C that campaign.toml states as known, beside those that the pushes give without it; none where there is no
+    K to use."""
+    if not has_numbers_to_use(diagnosis):
+        return []
+    rows = diagnosis.get("stated", [])
+    if not rows:
+        return []
+    meant = stiffness_words(diagnosis)
+    more = say("stated_more") if len(rows) > _STATED else ""
+    more += say("stated_means", meant=meant) if meant and any(row["alone"] for row in rows) else ""
+    return [say("stated", each="; ".join(map(_stated_words, rows[:_STATED])), more=more)]
+
+
+def _stated_words(row: Mapping[str, Any]) -> str:
+    """K = 1100 ± 220 N/m is stated, the pushes alone give 1088 ± 25 N/m (1.1 % less): they agree"""
+    name, at = {"stiffness": "K", "damping": "C"}[row["parameter"].partition("@")[0]], _at(row["parameter"])
+    stated = number_words(row["stated"])
+    if row["alone"] is None:
+        return say("stated_open", name=name, at=at, stated=stated)
+    change = row["difference"]["value"] / row["stated"]["value"]
+    by = say("stated_by", share=100 * abs(change), more="more" if change > 0 else "less")
+    agrees = say("stated_agrees" if row["agrees"] else "stated_differs")
+    return say("stated_one", name=name, at=at, stated=stated, alone=number_words(row["alone"]), by=by, agrees=agrees)
 
 
 def _bound(name: str, bound: float) -> str:

@@ -9,6 +9,7 @@ from experiments.diagnose.core import freedom as module
 from experiments.diagnose.core.freedom import Freedoms
 from experiments.diagnose.fit.fitting import Fit
 from experiments.diagnose.fit.problem import Parameter
+from experiments.diagnose.push.design import _predicted
 
 NOISE, BEDS, COUNT = 0.01, 0.02, 7
 
@@ -53,3 +54,16 @@ def test_what_no_bed_changes_and_what_is_known_has_no_freedom():
     assert freedom_of(fitted(), 0, None) is None
     assert freedom_of(fitted(known_std=("bed",)), 0, 2) is None
     assert freedom_of(fitted(beds=1e-4), 0, 2) is None
+
+
+def test_a_planned_push_states_which_part_of_a_models_error_rests_on_the_beds():
+    """K of seven beds: its variance (s_bed² + s_noise²) / 7, of which the beds make s_bed² / 7; F = K z."""
+    found, z = fitted(), np.array([0.01, 0.02])
+
+    def predict(points, diameter, time, z, v):
+        return np.array([own["stiffness"] * z for own, _ in points])
+
+    found.model.forms = ()
+    _, errors, rests = _predicted(found, predict, 1.0, 0.02, z, z, z)
+    assert np.linalg.norm(errors, axis=1) == pytest.approx(np.hypot(BEDS, NOISE) / COUNT**0.5 * z, rel=1e-6)
+    assert rests == pytest.approx(BEDS / COUNT**0.5 * z, rel=1e-6)

@@ -8,6 +8,7 @@ import pytest
 from golden import golden
 
 from experiments.diagnose.core.planned_pushes import (
+    by_chance,
     chosen_push,
     in_other_beds,
     no_push_words,
@@ -18,6 +19,7 @@ from experiments.diagnose.fit.problem import Parameter
 from experiments.diagnose.fit.trials import Planned
 from experiments.diagnose.push.beds import in_one_bed
 from experiments.diagnose.push.design import _of_beds
+from rigid.intervals import student
 
 APART = {"depth_m": 0.024, "speed_m_s": 0.05, "one_N": 40.0, "other_N": 39.0, "one_std_N": 0.1, "other_std_N": 0.1,
          "noise_N": 0.05}  # fmt: skip
@@ -37,6 +39,34 @@ def test_the_mean_of_more_pushes_separates_them_unless_the_models_are_too_uncert
     assert pushes_needed(in_other_beds(APART, {"bed": 0.03})) == 7
     assert pushes_needed(in_other_beds(APART | {"one_std_N": 0.6}, {"bed": 0.03})) is None
     assert pushes_needed(in_other_beds(APART, {"bed": 0.2})) is None
+
+
+def test_few_beds_need_students_t_to_separate_two_models():
+    """t of 2 degrees of freedom is 4.303: 1.2 N of beds leave 5.2 N open in one push, not 2.4 N."""
+    far, few = APART | {"other_N": 36.0, "noise_N": 0.0}, {"bed": 0.03, "freedom": 2}
+    assert separates(in_other_beds(far, {"bed": 0.03}))
+    wide = in_other_beds(far, few)
+    std = math.hypot(0.1, 0.1, 1.2)
+    assert by_chance(wide) == pytest.approx(student(2 * (std / 1.2) ** 4) * std) and not separates(wide)
+    assert separates(in_other_beds(far, {"bed": 0.03, "freedom": 30}))
+
+
+def test_the_mean_of_pushes_in_few_beds_has_students_t_of_all_of_them():
+    """Of n further beds: freedom 2 + n - 1. 1 N against t (2 x 0.1² + 1.2010² / n)^0.5 is passed from n = 8 on."""
+    wide = in_other_beds(APART, {"bed": 0.03, "freedom": 2})
+    count = pushes_needed(wide)
+    assert count == 8 > pushes_needed(in_other_beds(APART, {"bed": 0.03}))
+    std, part = math.sqrt(0.02 + (1.2**2 + 0.05**2) / count), 1.2 / math.sqrt(count)
+    assert by_chance(wide, count) == pytest.approx(student((1 + count) * (std / part) ** 4) * std)
+
+
+def test_the_error_of_a_model_that_rests_on_few_beds_has_their_freedom():
+    """K of few beds: with 2 degrees of freedom 0.5 N of one model leave 2.2 N open, known 1 N."""
+    sure = APART | {"one_std_N": 0.5, "other_std_N": 0.0, "noise_N": 0.0, "one_beds_N": 1e-9, "other_beds_N": 1e-9}
+    scatter = {"bed": 0.03, "freedom": 2}
+    assert by_chance(in_other_beds(sure, scatter)) == pytest.approx(1.96 * 0.5, rel=1e-4)
+    wide = in_other_beds(sure | {"one_rests_N": 0.5}, scatter)
+    assert by_chance(wide) == pytest.approx(student(2) * 0.5) and wide["one_freedom"] == pytest.approx(2)
 
 
 def test_the_sentence_says_that_no_push_would_and_what_would():
