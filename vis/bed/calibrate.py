@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 from matplotlib.axes import Axes
@@ -82,7 +83,9 @@ def _response(report: Report, key: str) -> Block:
         error = [point["figures"][name][1] for point in result["points"]]
         axis.errorbar(at, found, yerr=error, color=BED, marker="o", ms=4, ls="")
         end, off = _simulated(entry), entry["error"]
-        axis.errorbar([best], [end], yerr=[off], color=INK, marker="D", ms=5, ls="", zorder=5)
+        axis.errorbar(
+            [best], [math.nan if end is None else end], yerr=[off], color=INK, marker="D", ms=5, ls="", zorder=5
+        )
         axis.axvline(best, color=INK, lw=0.8, ls=(0, (2, 2)))
         axis.set(xlabel=f"{key.replace('_', ' ')} [{unit}]", ylabel=_axis_words(entry))
     handles = [

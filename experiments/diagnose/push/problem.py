@@ -423,8 +423,8 @@ class PenetrationProblem(Problem):
             for form in forms
         )  # fmt: skip
         pairs = (self._pairs(values), self._pairs(base) if forms and base is not None else {})
-        noted = (self.covered, float(values.get(SURFACE, 0.0)), notes or {})
-        write_model(Path(path), model_of(self.tables, self._middle, *pairs, effects, *noted))
+        surface, more = float(values.get(SURFACE, 0.0)), notes or {}
+        write_model(Path(path), model_of(self.tables, self._middle, *pairs, effects, self.covered, surface, more))
 
     def _pairs(self, values: Values) -> Pairs:
         """Diameter [m] as text -> K [N/m] and C [N s/m]."""
