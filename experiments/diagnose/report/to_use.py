@@ -7,6 +7,7 @@ from typing import Any
 
 from experiments.campaign.model_errors import bias_words
 from experiments.diagnose.fit.gaps import numeral
+from experiments.diagnose.push.parameters import SURFACE
 from rigid.intervals import half_of
 from vis.diagnose.usable import has_numbers_to_use, secant_depth, stiffness_words
 from vis.page.numbers import fitted, foldable
@@ -52,7 +53,17 @@ def use_sentences(diagnosis: Mapping[str, Any]) -> list[str]:
     bounds = "".join(_bound(name, after[name]["at_most"]) for name in is_open[:_SHOWN] if "at_most" in after[name])
     covered = diagnosis.get("covered", {})
     no_way_out = "" if covered.get("withdrawal", True) else f" {say('no_withdrawal')}"
-    return [sentence + (say("c_is_open", bounds=bounds) if is_open else "") + _in_series(covered) + no_way_out]
+    sentence += (say("c_is_open", bounds=bounds) if is_open else "") + _in_series(covered)
+    return [sentence + no_way_out, *_surface(after.get(SURFACE))]
+
+
+def _surface(entry: Mapping[str, Any] | None) -> list[str]:
+    """From which depth on the bed carries, where that is more than 0 by its 95 % interval."""
+    half = None if entry is None else half_of(entry)
+    if entry is None or half is None or entry["value"] <= half:
+        return []
+    in_mm = {**entry, "value": 1e3 * entry["value"], "std": 1e3 * entry["std"], "unit": "mm"}
+    return [say("surface", depth=number_words(in_mm))]
 
 
 def _in_series(covered: Mapping[str, Any]) -> str:
