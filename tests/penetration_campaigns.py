@@ -7,7 +7,6 @@ from scipy.integrate import solve_ivp
 
 from experiments.campaign import Campaign, PenetrationCampaign, Recording, write_campaign
 from experiments.campaign.digests import DIGESTS
-from experiments.diagnose.push.parameters import SURFACE
 
 MASS, STIFFNESS, DAMPING, GRAVITY = 0.5, 900.0, 4.0, 9.80665
 DEPTH_STD, FORCE_STD, ACCEL_STD = 1e-4, 0.05, 0.1
@@ -66,7 +65,7 @@ def campaign_of(trials, *, stiffness=1.05 * STIFFNESS, damping=0.9 * DAMPING, do
 
 def on_firm_ground(problem):
     """The problem of pushes whose bed carries from the first touch on, as one knows: its base model is linear."""
-    problem.base = tuple(parameter for parameter in problem.base if parameter.name != SURFACE)
+    problem.base = tuple(parameter for parameter in problem.base if parameter.name != problem.loose)
     return problem
 
 

@@ -41,8 +41,14 @@ def diagnose(
 ) -> Diagnosis:
     """Diagnose a campaign; the same campaign gives the same answer. `tell(what, share done)` reports progress.
     `thorough`: nulls by full refits, which takes long; they are kept in the folder `gates`, if given."""
-    course = _Course(problem, _Asked(thorough, seed, tell or (lambda what, done: None), gates))
-    return too_noisy.as_contract(course.run())
+    asked = _Asked(thorough, seed, tell or (lambda what, done: None), gates)
+    other = deepcopy(problem) if problem.loose else None
+    found = _Course(problem, asked).run()
+    if found.verdict == "unknown" and other is not None:
+        other.base = tuple(parameter for parameter in other.base if parameter.name != problem.loose)
+        again = _Course(other, asked).run()
+        found = found if again.verdict == "unknown" else again
+    return too_noisy.as_contract(found)
 
 
 @dataclass(frozen=True)
@@ -73,11 +79,6 @@ class _Asked:
 class _Course:
     """One course of a diagnosis: what is known so far, and the steps in their order."""
 
-    findings: list[Finding]
-    held_out: tuple[str, ...]
-    begun: _Begun
-    base: Fit
-    jitters: tuple[Jitter, ...]
     colours: dict[str, Colour]
     first: Verdict  # the gate on the base model
 
@@ -132,9 +133,8 @@ class _Course:
         problem.calm({})
         begun = asked.begun
         if begun is None or begun.jitters or not (asked.aside or asked.looked_at):  # or else all is fitted anew below
-            base, jitters = renoised.jittered(
-                renoised.whitened_fit(Model(problem, Whitener.white(problem), fitted)), self.held_out
-            )
+            plain = renoised.whitened_fit(Model(problem, Whitener.white(problem), fitted))
+            base, jitters = renoised.jittered(plain, self.held_out)
             odd = []
             if any(len(ids) > 2 for ids in groups_of(problem.trials).values()) or problem.contacts is None:
                 odd = odd_trials(renoised.whitened_fit(base.model.on([t.id for t in problem.trials])))

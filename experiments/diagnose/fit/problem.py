@@ -155,6 +155,7 @@ class Problem(Protocol):
     """Forms of another shape, tried from where the plain one ends, by the id of that."""
     findings: tuple[Finding, ...]  # what was found wrong with the data when it was read
     design: str  # digest of what decides the gate: sampling, conditions, noise, priors; not of the measured numbers
+    loose: str = ""  # name of a base parameter without which what is `unknown` is looked at once more
     granular: bool = True  # whether replicates differ because grains lie otherwise in each bed
     by_path: bool = False
     """Whether trials follow a measured path: its error depends on the model (`rewhiten`), and replicates are compared
@@ -170,8 +171,7 @@ class Problem(Protocol):
     """Relative scatter below this is not the bed's: the smoothing of a depth column does as much."""
     hidden_scatter: tuple[str, ...] = ()  # kinds that are asked for only where something is left
     special_scatter: tuple[str, ...] = ()  # kinds that are not asked for with all others at once
-    zero_scatter: tuple[str, ...] = ()
-    """Kinds that are asked for by themselves where the others do not explain what is left."""
+    zero_scatter: tuple[str, ...] = ()  # kinds that are asked for by themselves where the others do not explain all
     force_scatter: tuple[str, ...] = ()  # and after these; they count where they explain all
     how_to_determine: str = ""  # one sentence: the trial that would determine what is `undetermined`
     typical_depth: float | None = None  # D of the equations of pushes and drops [m]; None of tumbles

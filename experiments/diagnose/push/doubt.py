@@ -1,5 +1,7 @@
 """What the error of a smoothed depth leaves in doubt of a driven trial's force: at the surface, and where it turns."""
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,7 +11,9 @@ from experiments.grains.spells import spells
 from .data import Prepared
 from .depth import SmoothDepth
 
-__all__ = ["bounded", "jumping", "off_rest", "off_surface", "path_error", "reversing", "touching", "turning"]
+__all__ = [
+    "bounded", "jumping", "off_rest", "off_surface", "path_error", "reversing", "touching", "turning", "with_jumps",
+]  # fmt: skip
 
 _BESIDE = 5  # rows before and after a turn that show the force there
 _AT_TURN = 6
@@ -80,6 +84,18 @@ def jumping(trial: Prepared, by_depth: Array, by_speed: Array, shallow: float) -
     below = float(np.median(np.abs(trial.other[here]))) if here.any() else 0.0
     start = max(jump, below) + np.abs(by_depth).max() * smooth.depth_std
     return bend**2 + (start * touching(trial)) ** 2
+
+
+def with_jumps(trial: Prepared, doubt: Array, force_at: Callable[[tuple[float, float, float]], Array]) -> Array:
+    """The doubt of a driven force [N] where it jumps: at the surface, and with friction where the motion turns. It is
+    half of what the path leaves open. `force_at`: the force with the path shifted, as `push` takes shifts."""
+    turn = np.maximum(off_rest(trial), np.abs(trial.path.speed))
+    for rows, off, speed in ((touching(trial), off_surface(trial), 0.0), (reversing(trial), turn, 1.0)):
+        if rows.any():
+            ways = [side * float(off[rows].max()) for side in (1, -1)]
+            up, down = (force_at((way * (1 - speed), way * speed, 0.0)) for way in ways)
+            doubt = np.where(rows, np.maximum(doubt, 0.5 * np.abs(up - down)), doubt)
+    return doubt
 
 
 def turning(speed: Array, std: Array, force: Array, noise: float) -> tuple[Array, Array]:

@@ -28,7 +28,7 @@ from .beds import OWN, centred, in_one_bed, own_numbers, scatter_parameters
 from .data import Prepared, of_drop, prepare, stds, tip_depth
 from .depth import SmoothDepth
 from .design import best_push
-from .doubt import bounded, jumping, off_rest, off_surface, path_error, reversing, touching, turning
+from .doubt import bounded, jumping, path_error, turning, with_jumps
 from .forms import physical, push_forms, unit_of
 from .law import PHASES, fall, push_each
 from .model_file import Pairs, model_of, range_of
@@ -61,6 +61,7 @@ class PenetrationProblem(Problem):
     whole = "the bed or the tip"
     clocks = (("force",), ("depth", "accel"))
     by_path = True
+    loose = SURFACE
     hidden_scatter = ("bed damping", "bed unloading")  # near to what a speed does, and to what a depth does
     zero_scatter = ("bed", "depth zero")  # at one speed a damper and a depth's zero are the same
     force_scatter = ("force zero",)  # of pushes that begin at the surface, where no row reads it
@@ -322,14 +323,7 @@ class PenetrationProblem(Problem):
         this = self.prepared[trial]
         ((_, by_depth, by_row, _),) = self._slopes(values, forms, [this])
         doubt = np.linalg.norm(path_error(this.path, by_depth, by_row), axis=1) / this.path.inflation
-        # The force jumps at the surface, and with friction where the motion turns: half of what the path leaves open.
-        turn = np.maximum(off_rest(this), np.abs(this.path.speed))
-        for rows, off, speed in ((touching(this), off_surface(this), 0.0), (reversing(this), turn, 1.0)):
-            if rows.any():
-                ways = [side * float(off[rows].max()) for side in (1, -1)]
-                shifts = [(way * (1 - speed), way * speed, 0.0) for way in ways]
-                up, down = (self._run([values], forms, [this], shift)[0][0] for shift in shifts)
-                doubt = np.where(rows, np.maximum(doubt, 0.5 * np.abs(up - down)), doubt)
+        doubt = with_jumps(this, doubt, lambda shift: self._run([values], forms, [this], shift)[0][0])
         return np.hypot(stds(self.tables, True)[1], doubt[this.has_other])
 
     def samples(self, trial: str) -> Samples:
