@@ -18,6 +18,7 @@ __all__ = [
     "OTHERS_NOTE",
     "RANGE_NOTE",
     "SCATTER_NOTE",
+    "SURFACE",
     "SURFACE_NOTE",
     "FORMAT",
     "DepthSensor",
@@ -58,6 +59,8 @@ ERRORS_NOTE = "fitted_errors"
 """A note of model.toml: `names` of the fitted numbers (``stiffness``, ``effect.parameter``), their standard errors
 `std` and `correlation`, rows in the order of `names`; `undetermined`: names of those without a standard error;
 `freedom`: name -> degrees of freedom of its standard error, of those that rest on the scatter of few beds."""
+SURFACE = "surface_depth"
+"""The fitted number of pushes and drops that is noted in `SURFACE_NOTE`."""
 SURFACE_NOTE = "fitted_surface"
 """A note of model.toml: `depth_m`, how deep below the zero of the depth the bed begins to carry."""
 SCATTER_NOTE = "fitted_scatter"

@@ -9,6 +9,7 @@ from pathlib import Path
 from threadpoolctl import threadpool_limits
 
 from experiments.campaign import Campaign, read_campaign
+from experiments.campaign.tables import SURFACE
 from experiments.check import find_implausible, find_unstated, missing_sensors, said_once, template_warning
 from experiments.diagnose.settings import DiagnoseSettings
 from experiments.runs.folder import RunFolder
@@ -27,7 +28,6 @@ from .fit.gaps import numeral
 from .fit.problem import Problem
 from .noise.colour import together
 from .push.frame import at_the_tip
-from .push.parameters import SURFACE
 from .report.document import write_diagnosis
 from .report.sentences import findings_in_words, told_tables, where_sentences
 from .report.spread import spread_sentences

@@ -44,7 +44,7 @@ def beside_stated(found: Diagnosis) -> list[Beside]:
     covariance = best.covariance()  # as the fit weighed the data: `numbers` have the noise that it found
     shown = []
     for place, p in enumerate(best.model.parameters):
-        if p.name not in numbers or not 0 < p.std < math.inf:
+        if p.name not in numbers or p.name == found.problem.loose or not 0 < p.std < math.inf:
             continue
         stated: Estimated = {"value": p.value, "std": p.std, "unit": p.unit}
         alone = without_prior(numbers[p.name], stated, share=float(covariance[place, place]) / p.std**2)

@@ -6,16 +6,16 @@ from collections.abc import Sequence
 import numpy as np
 
 from experiments.campaign import PenetrationCampaign
+from experiments.campaign.tables import SURFACE
 from experiments.diagnose.fit.problem import Array, Parameter
 
 from .data import Prepared
 from .forms import Scales
 
 __all__ = [
-    "SURFACE", "base_parameters", "comes_back", "diameters_of", "find_scales", "loose_surface", "named", "speeds_of",
+    "base_parameters", "comes_back", "diameters_of", "find_scales", "loose_surface", "named", "speeds_of",
 ]  # fmt: skip
 
-SURFACE = "surface_depth"  # the name of `loose_surface`
 _LOOSE = 0.01  # its standard deviation before any reading, over D
 
 

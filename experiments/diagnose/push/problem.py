@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.campaign import Campaign, EffectTable, PenetrationCampaign, write_model
+from experiments.campaign.tables import SURFACE
 from experiments.diagnose.core.effect_texts import push_advice
 from experiments.diagnose.fit.forms import PENETRATION_HOOKS, OwnEffect, shapes_of
 from experiments.diagnose.fit.localise import acceleration
@@ -32,7 +33,7 @@ from .doubt import bounded, jumping, path_error, turning, with_jumps
 from .forms import physical, push_forms, unit_of
 from .law import PHASES, fall, push_each
 from .model_file import Pairs, model_of, range_of
-from .parameters import SURFACE, base_parameters, comes_back, diameters_of, find_scales, loose_surface, named, speeds_of
+from .parameters import base_parameters, comes_back, diameters_of, find_scales, loose_surface, named, speeds_of
 from .remarks import SURE, Push, at_one_speed, contradict, facts, highest_dampings, how_to_determine
 from .slots import PLACES, slot_places, slot_table
 from .stops import doubts_of_damping

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from experiments.campaign.model_errors import bias_words
+from experiments.campaign.tables import SURFACE
 from experiments.diagnose.fit.gaps import numeral
-from experiments.diagnose.push.parameters import SURFACE
 from rigid.intervals import half_of
 from vis.diagnose.usable import has_numbers_to_use, secant_depth, stiffness_words
 from vis.page.numbers import fitted, foldable

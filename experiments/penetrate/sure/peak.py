@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from coupling import Penetration
 from experiments.campaign.model_errors import SHARE, ModelErrors
+from experiments.campaign.tables import SURFACE
 from experiments.diagnose.fit.forms import OwnEffect
 from experiments.diagnose.push.law import push
-from experiments.diagnose.push.parameters import SURFACE
 from experiments.diagnose.push.slots import SLOTS, slot_places
 from experiments.runs.types import Json
 from rigid.intervals import joint_freedom
