@@ -23,7 +23,7 @@ from vis.diagnose.figures import (
     source_of,
     worst,
 )
-from vis.diagnose.report import write_diagnosis_report
+from vis.diagnose.report import _tile_of, write_diagnosis_report
 from vis.diagnose.usable import gap_in_scatter
 from vis.page.plots import line_handles, line_styles
 
@@ -311,3 +311,16 @@ def test_a_gap_over_few_trials_has_students_interval_and_the_table_has_95_percen
     write_folder(tmp_path, trials={"a": 3.0, "d": 2.0}, scatter=0.2)
     page = write_diagnosis_report(tmp_path).read_text(encoding="utf-8")
     assert "standard error" not in page.replace("1.96 standard errors", "")
+
+
+@pytest.mark.parametrize(
+    ("name", "label"),
+    [
+        ("stiffness@0.06_after", "Stiffness (60 mm)"),
+        ("damping_after", "Damping"),
+        ("depth-hardening.bend", "Bend (depth-hardening)"),
+    ],
+)
+def test_a_number_of_one_diameter_is_named_by_it(name, label):
+    tile = _tile_of(name, {"value": 1690.0, "std": 75.0, "unit": "N/m", "note": ""})
+    assert (tile.label, tile.value) == (label, "1690 ± 150 N/m")
