@@ -105,7 +105,7 @@ class RobotFollowed(Followed[RobotRun]):
         return f"note: {say('idle_so_far', time=run.time)}" if idle(self.plan, run) else None
 
     def conclude(self, run: RobotRun, folder: Path) -> Result:
-        own = on_law(run)
+        own = on_law(run, self.plan)
         sure, said = sure_of_law(self.plan, own.answer, self._answer_of)
         forms = forms_of(self.plan, own, self._long_enough, sure=sure)
         return conclude(self.settings, self.plan, run, folder, sure=sure, sure_words=said, forms=forms)
@@ -120,7 +120,7 @@ class RobotFollowed(Followed[RobotRun]):
         """The same until the robot is in flight or at rest."""
         run = RobotFollowed(plan.settings, plan).run_on_law()
         follow_on(run)
-        return on_law(run)
+        return on_law(run, plan)
 
 
 def _stepping(settings: RobotSettings) -> Mapping[str, Any]:
@@ -417,7 +417,8 @@ class RobotOnBed(RobotFollowed, OnLoweredBed[RobotSettings, RobotRun, RobotForec
         law = self.settings.default_law
         if law == "spring-damper":
             return NO_FORMS
-        return forms_of(self.plan.on_law(law), on_law(self.beside), self._long_enough, sure={})
+        plan = self.plan.on_law(law)
+        return forms_of(plan, on_law(self.beside, plan), self._long_enough, sure={})
 
     def conclude(self, run: RobotRun, folder: Path) -> Result:
         forms = with_grains(self.forms, answer_of_run(run), depth=self.settings.bed_size[2])
