@@ -205,12 +205,12 @@ def expected_words(numbers: Json, best: Answer, *, on_grains: bool) -> list[str]
 def _shown(name: str, answers: Mapping[str, Answer], over: Json | None) -> tuple[dict[str, str], str]:
     """Law -> this number of its answer, and the ends of the range `over` the laws, all in one unit."""
     unit, values = ANSWER[name], [answer[name] for answer in answers.values()]
-    ends = (over["low"], over["high"]) if over is not None else (min(values), max(values))
-    shown = dict(zip(answers, in_one_unit(values, unit, widest=ends), strict=True))
+    low, high = (over["low"], over["high"]) if over is not None else (min(values), max(values))
+    shown = dict(zip(answers, in_one_unit(values, unit, widest=(low, high)), strict=True))
     if name == "highest":
         stay = (law for law, answer in answers.items() if answer["longest_flight"] == answer[name] == 0)
         shown |= dict.fromkeys(stay, say("no_hop"))
-    return shown, between(*ends, unit)
+    return shown, between(low, high, unit)
 
 
 def _expected(law: str, *, on_grains: bool, softer: bool, fast: bool) -> list[str]:
