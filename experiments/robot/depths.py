@@ -29,17 +29,17 @@ class Deepest:
         return self.depth > self.limit
 
 
-def depths_of_parts(run: RobotRun) -> Iterator[tuple[Part, float]]:
-    """Each part of a foot, with the largest depth of its lowest point [m]."""
-    feet = run.feet
+def depths_of_parts(run: RobotRun, end: int | None = None) -> Iterator[tuple[Part, float]]:
+    """Each part of a foot, with the largest depth of its lowest point [m], until row `end`."""
+    feet = run.feet[:end]
     for k, foot in enumerate(run.robot.feet):
         turned = ups(feet[:, k, 3:7])
         for part in foot.parts:
             yield part, -float(_lowest(feet[:, k, 2], part, turned).min())
 
 
-def deepest_part(run: RobotRun, diameters: Mapping[str, float]) -> Deepest | None:
-    """Of a run on a law; None where none goes into the ground. ``diameters``: of each part [m].
+def deepest_part(run: RobotRun, diameters: Mapping[str, float], end: int | None = None) -> Deepest | None:
+    """Of a run on a law, until row `end`; None where none goes into the ground. ``diameters``: of each part [m].
 
     A law without a depth of its own holds as deep as `rft` was compared with grains.
     """
@@ -49,7 +49,7 @@ def deepest_part(run: RobotRun, diameters: Mapping[str, float]) -> Deepest | Non
             name=part.name, depth=depth, diameter=diameters[part.name],
             limit=limits.get(part.name, DEEPEST["rft"] * diameters[part.name]),
         )
-        for part, depth in depths_of_parts(run)
+        for part, depth in depths_of_parts(run, end)
         if depth > 0
     ]  # fmt: skip
     return max(found, key=lambda one: one.depth / one.limit, default=None)

@@ -8,6 +8,7 @@ the error that the form of the law makes, and no bound.
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 from experiments.runs.types import Json
 from vis.page.numbers import between, foldable, in_one_unit
@@ -33,6 +34,8 @@ LAWS: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("power-irreversible", ()), ("katsuragi-durian", ()), ("bekker", ()),
 )  # fmt: skip
 """Laws that have numbers for sand, with their parameters."""
+OF_LANDING = ("sinkage_largest", "largest_force")
+"""Numbers that a landing after the first flight may decide; the others are those of the push."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,6 +46,7 @@ class OnLaw:
     time: float  # Simulated [s]
     rising: bool = False  # Whether it ends on its way up, before it flies: its rise is not known
     deepest: Deepest | None = None  # The part of a foot that went deepest over the depth to which the law holds
+    deepest_before: Deepest | None = None  # The same until the first flight
     push_speed: float | None = None  # Of the fastest foot in the ground when the push begins [m/s]
     fast: bool = False  # Whether a foot was faster than laws were compared with grains
 
@@ -106,17 +110,18 @@ def forms_of(plan: RobotPlan, own: OnLaw, follow: Callable[[RobotPlan], OnLaw], 
         "longest": max(one.time for one in runs.values()), "lost": lost,
         "rising": [name for name, one in runs.items() if one.rising], "fast": own.fast,
         "beyond": _beyond(runs, still=math.sqrt(2 * plan.numbers["gravity"].value * REST)),
+        "beyond_later": _beyond_later(runs),
     }  # fmt: skip
-    held = not own.rising and here not in numbers["beyond"]
-    ends = [{name: one[end] for name, one in sure.items()} for end in ("low", "high")] if held else []
+    held = {} if own.rising else _held(numbers, {here: sure}).get(here, {})
+    ends = [{name: one[end] for name, one in held.items()} for end in ("low", "high")]
     return _ranges(numbers, own.answer, ends, on_grains=False)
 
 
 def _beyond(runs: Mapping[str, OnLaw], *, still: float) -> dict[str, str]:
-    """Law -> why its numbers are not to be quoted, of those outside the range that they hold in.
+    """Law -> why none of its numbers is to be quoted, of those outside the range that they hold in.
 
-    A foot went deeper than its law holds. Or it still moved when the push began, faster than ``still`` [m/s], where it
-    was at rest on another law: the push then meets another state of the robot.
+    A foot went deeper than its law holds before the first flight. Or it still moved when the push began, faster than
+    ``still`` [m/s], where it was at rest on another law: the push then meets another state of the robot.
     """
     found = {}
     rested = any(one.push_speed is not None and one.push_speed <= still for one in runs.values())
@@ -124,13 +129,29 @@ def _beyond(runs: Mapping[str, OnLaw], *, still: float) -> dict[str, str]:
         if one.rising:
             continue
         why = []
-        if one.deepest is not None and one.deepest.beyond:
-            why.append(_too_deep(one.deepest))
+        if one.deepest_before is not None and one.deepest_before.beyond:
+            why.append(_too_deep(one.deepest_before))
         if rested and one.push_speed is not None and one.push_speed > still:
             why.append(say("beyond_speed", speed=one.push_speed))
         if why:
             found[name] = say("and").join(why)
     return found
+
+
+def _beyond_later(runs: Mapping[str, OnLaw]) -> dict[str, str]:
+    """Law -> why its numbers of `OF_LANDING` are not to be quoted: a foot goes deeper than the law holds."""
+    deep = {name: one.deepest for name, one in runs.items() if not one.rising}
+    return {name: _too_deep(one) for name, one in deep.items() if one is not None and one.beyond}
+
+
+def _held(numbers: Json, found: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
+    """Law -> those of its numbers that hold; laws without any are left out. ``numbers``: as of `Forms`."""
+    beyond, later = numbers.get("beyond", ()), numbers.get("beyond_later", ())
+    return {
+        law: {name: value for name, value in values.items() if law not in later or name not in OF_LANDING}
+        for law, values in found.items()
+        if law not in beyond
+    }
 
 
 def _too_deep(one: Deepest) -> str:
@@ -157,7 +178,7 @@ def _ranges(numbers: Json, best: Answer, more: Sequence[Answer], *, on_grains: b
     """
     if not numbers["laws"]:
         return Forms(words=tuple(map(foldable, _left_out(numbers))))
-    answers = {law: answer for law, answer in numbers["laws"].items() if law not in numbers.get("beyond", ())}
+    answers = _held(numbers, numbers["laws"])
     if not answers:
         numbers = {name: value for name, value in numbers.items() if name != "ranges"}
         words = expected_words(numbers, best, on_grains=on_grains)
@@ -165,7 +186,8 @@ def _ranges(numbers: Json, best: Answer, more: Sequence[Answer], *, on_grains: b
     ranges = {}
     for name in ANSWER:
         values = [answer[name] for answer in (*answers.values(), *more) if name in answer]
-        ranges[name] = entry(name, best[name], min(values), max(values))
+        if len(values) > on_grains:  # of one law at least, beside the bed
+            ranges[name] = entry(name, best[name], min(values), max(values))
     numbers = {**numbers, "ranges": ranges}
     words = expected_words(numbers, best, on_grains=on_grains)
     return Forms(numbers=numbers, words=tuple(map(foldable, words)))
@@ -176,19 +198,23 @@ def expected_words(numbers: Json, best: Answer, *, on_grains: bool) -> list[str]
 
     ``numbers``: as of `Forms`. ``best``: answer of the run, on grains (`on_grains`) or on a law.
     """
-    answers, ranges, beyond = numbers["laws"], numbers.get("ranges"), numbers.get("beyond", {})
+    answers, ranges = numbers["laws"], numbers.get("ranges", {})
     told = "highest" if best["longest_flight"] > 0 else "sinkage_largest"
-    each, ends = _shown(told, answers, (ranges or {}).get(told))
+    beyond = {**(numbers.get("beyond_later", {}) if told in OF_LANDING else {}), **numbers.get("beyond", {})}
+    later = [law for law in numbers.get("beyond_later", ()) if law not in beyond]
+    each, ends = _shown(told, answers, ranges.get(told))
     what = say(f"called_{told}")
     near = [law for law in (_named(DEFAULT, (DROPPED_INERTIA,)), DEFAULT) if law in answers]
     held = "; ".join(f"{law} {number}" for law, number in each.items() if law not in beyond)
     key = "forms_with_grains" if on_grains else "forms_of_laws"
-    said = [say(key, what=what, ends=ends, each=held)] if ranges else [say("forms_of_none", what=what)]
+    said = [say(key, what=what, ends=ends, each=held)] if told in ranges else [say("forms_of_none", what=what)]
     if beyond:
         reasons = "; ".join(f"{law} {each[law]} ({why})" for law, why in beyond.items() if law in each)
-        said.append(say("forms_beyond", what=what, each=reasons))
+        said.append(say("forms_beyond", each=reasons))
+    if later:
+        said.append(say("forms_beyond_later", laws="; ".join(later)))
     said += _left_out(numbers)
-    if near and ranges:
+    if near and told in ranges:
         softer = on_grains and best["sinkage_largest"] > answers[near[0]]["sinkage_largest"]
         said += _expected(near[0], on_grains=on_grains, softer=softer, fast=numbers.get("fast", False))
     bed_depth = numbers.get("bed_depth", math.inf)

@@ -51,8 +51,10 @@ def follow_on(run: RobotRun) -> None:
 def on_law(run: RobotRun, plan: RobotPlan) -> OnLaw:
     """What a run on a law leaves for the range over the laws."""
     answer, heights, flights = _answer(run)
+    launch = flights.rows[0][0] + 1 if flights.rows else None
     return OnLaw(
         answer=answer, time=run.time, rising=rising(run, flights), deepest=deepest_part(run, plan.diameters),
+        deepest_before=deepest_part(run, plan.diameters, launch),
         push_speed=foot_speed_at_push(run, heights, flights), fast=bool(too_fast(plan, run, heights)),
     )  # fmt: skip
 

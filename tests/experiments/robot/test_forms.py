@@ -103,7 +103,7 @@ def deep(depth):
 def test_laws_whose_foot_went_deeper_than_they_hold_or_moved_when_it_pushed_are_named_but_not_in_the_range():
     plan = planned()
     runs = {
-        "spring-damper": on_law(0.9, deepest=deep(0.09), push_speed=0.01),
+        "spring-damper": on_law(0.9, deepest_before=deep(0.09), push_speed=0.01),
         "bekker": on_law(0.8, deepest=deep(0.03), push_speed=0.5),
     }
     held = on_law(0.06, deepest=deep(0.05), push_speed=0.02)
@@ -121,9 +121,31 @@ def test_a_push_out_of_a_motion_that_all_laws_have_leaves_none_out_and_without_a
     plan, moving = planned(), on_law(0.06, push_speed=0.5)
     forms = forms_of(plan, moving, lambda _: moving, sure={"highest": {"low": 0.05, "high": 0.07}})
     assert not forms.numbers["beyond"] and forms.numbers["ranges"]["highest"]["high"] == 0.07
-    none = forms_of(plan, on_law(0.06, deepest=deep(0.1)), lambda _: on_law(0.06, deepest=deep(0.1)), sure={})
+    none = forms_of(
+        plan, on_law(0.06, deepest_before=deep(0.1)), lambda _: on_law(0.06, deepest_before=deep(0.1)), sure={}
+    )
     for one in (none, with_grains(none, dict.fromkeys(ANSWER, 0.07))):
         assert "ranges" not in one.numbers and "no law holds" in one.words[0] and "bekker 60" in one.words[1]
+
+
+def test_a_law_whose_foot_goes_too_deep_in_a_later_landing_has_its_rise_in_the_range_and_neither_sinkage_nor_force():
+    plan, held = planned(), on_law(0.06, deepest=deep(0.05), deepest_before=deep(0.05))
+    lands = on_law(0.9, deepest=deep(0.09), deepest_before=deep(0.05))
+    sure = {name: {"low": 0.02, "high": 0.95} for name in ANSWER}
+    for own, others, most in ((held, lands, 0.06), (lands, held, 0.06)):
+        laws = forms_of(plan, own, lambda _, found=others: found, sure=sure)
+        grains = with_grains(laws, dict.fromkeys(ANSWER, 0.03))
+        for one in (laws, grains):
+            ranges = one.numbers["ranges"]
+            assert ranges["highest"]["high"] == (0.95 if one is laws else 0.9)
+            assert (
+                ranges["sinkage_largest"]["high"]
+                == ranges["largest_force"]["high"]
+                == (0.95 if own is held and one is laws else most)
+            )
+            assert any("later landing" in words for words in one.words)
+    none = with_grains(forms_of(plan, lands, lambda _: lands, sure={}), dict.fromkeys(ANSWER, 0.03))
+    assert set(none.numbers["ranges"]) == set(ANSWER) - {"sinkage_largest", "largest_force"}
 
 
 LEG = """<mujoco><worldbody><body pos="0 0 0.3"><joint type="slide" axis="0 0 1"/>
@@ -153,7 +175,11 @@ def test_a_law_into_which_a_leg_still_sinks_when_it_pushes_is_outside_its_range_
         runs[law.law] = of_run(run, law)
     rests, sinks = runs["rft"], runs["katsuragi-durian"]
     assert 0 <= rests.push_speed < 0.05 < 0.3 < sinks.push_speed
-    assert not rests.deepest.beyond and sinks.deepest.beyond and sinks.deepest.limit == pytest.approx(0.075, rel=0.01)
+    assert (
+        not rests.deepest_before.beyond
+        and sinks.deepest_before.beyond
+        and sinks.deepest_before.limit == pytest.approx(0.075, rel=0.01)
+    )
 
 
 def test_a_law_on_which_the_robot_still_pushes_off_is_left_out_and_named_and_so_in_the_run_itself():
