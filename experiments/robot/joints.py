@@ -9,7 +9,7 @@ from . import say
 
 __all__ = ["beyond_range"]
 
-BEYOND = 0.05
+BEYOND = 0.1
 """Share of its range that a joint may go beyond it without a warning [1]: one that rests on its limit gives way a
 little."""
 
