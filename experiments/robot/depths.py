@@ -4,14 +4,16 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from coupling.robot import LawFeet, RobotRun
 from coupling.robot.feet import Part
 
 from .laws import DEEPEST
-from .ups import Array, ups
 
-__all__ = ["Deepest", "deepest_part", "depths_of_parts"]
+__all__ = ["Array", "Deepest", "deepest_part", "depths_of_parts", "ups"]
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,6 +29,12 @@ class Deepest:
     def beyond(self) -> bool:
         """Whether it went deeper than its law holds."""
         return self.depth > self.limit
+
+
+def ups(turns: Array) -> Array:
+    """The world's upward direction in axes turned by unit quaternions, shape (n, 4): the third row of each matrix."""
+    w, x, y, z = turns.T
+    return np.column_stack([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)])
 
 
 def depths_of_parts(run: RobotRun, end: int | None = None) -> Iterator[tuple[Part, float]]:

@@ -10,9 +10,8 @@ from coupling.robot.soles import FASTEST
 from experiments.grains.spells import spells
 
 from . import say
-from .depths import depths_of_parts
+from .depths import Array, depths_of_parts, ups
 from .plan import RobotPlan
-from .ups import Array, ups
 
 __all__ = [
     "FEW", "bounce_warning", "bounce_words", "buried_words", "crater_losses", "feet_quantities", "feet_reached",
