@@ -26,7 +26,7 @@ ON_BED = ON_LAW | {
 GROUNDS = {"law": ON_LAW, "bed": ON_BED}
 
 
-@pytest.fixture(params=GROUNDS)
+@pytest.fixture(params=["law", pytest.param("bed", marks=pytest.mark.long)])
 def begun(request, tmp_path, monkeypatch):
     """Settings and folder of a run that is stopped at its 60th exchange."""
     monkeypatch.setattr(RobotOnBed, "prepare", lambda *_: grain_bed())
