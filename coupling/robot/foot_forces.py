@@ -67,11 +67,12 @@ class FootForces(AbstractContextManager["FootForces"]):
     slip_speed : below which friction falls with the slip [m/s]; a step of dt needs mu_d g dt at least.
 
     Several may be entered at once, one for each model; they take the place of any other ``mjcb_passive``. `points`
-    counts the points evaluated. Each MjData of the model has its own deepest depths. They are forgotten where its time
-    goes back or jumps by more than a step (``mj_resetData``, another state). A second call at the same time does not
-    count. It keeps the last MjData alive. Raises ValueError for an unknown law and for impossible numbers. It also does
-    so for numbers of one foot or gravity that are neither given nor known, such as K of spring-damper. On entry it also
-    refuses a step at which the exchange of a run would be unstable.
+    counts the points evaluated. A force sensor of MuJoCo does not see passive forces: `forces` returns them. Each
+    MjData of the model has its own deepest depths. They are forgotten where its time goes back or jumps by more than
+    a step (``mj_resetData``, another state). A second call at the same time does not count. It keeps the last MjData
+    alive. Raises ValueError for an unknown law and for impossible numbers. It also does so for numbers of one foot or
+    gravity that are neither given nor known, such as K of spring-damper. On entry it also refuses a step at which the
+    exchange of a run would be unstable.
     """
 
     def __init__(

@@ -26,15 +26,15 @@ def render(
     json: Annotated[bool, Parameter(help="Print the files that were drawn as JSON on stdout.", negative="")] = False,
     quiet: Annotated[bool, Parameter(help="Show no progress.", negative="")] = False,
 ) -> int:
-    """Draw pictures, film and report of a finished run again; of a stopped penetrate run those of its whole beds."""
+    """Draw pictures, film and report of a finished run again; of a stopped one of penetrate or mujoco what it has."""
     from vis.pictures.frames import check_frames
 
     with refusing():
         folder = RunFolder.open(run)
-        if folder.command == "penetrate" and folder.status not in ("done", None):
-            _conclude_stopped(folder)
+        if folder.command in _CONCLUDED and folder.status not in ("done", None):
+            _CONCLUDED[folder.command](folder)
         if not (run / "result.json").exists():
-            whole = " (no bed is whole)" if folder.command == "penetrate" else ""
+            whole = _NOTHING.get(folder.command, "")
             raise ValueError(
                 f"run = {str(run)!r} has no result yet{whole}: `hedgebed resume {run}` finishes it where it can be"
             )
@@ -85,6 +85,22 @@ def _conclude_stopped(folder: RunFolder) -> None:
     if result is not None:
         whole = len({entry["seed"] for entry in result["runs"]})
         say(f"warning: {words('whole_beds', count=whole, of=len(folder.settings['seeds']))}")
+
+
+def _conclude_robot(folder: RunFolder) -> None:
+    """Write the result of what a run of mujoco has computed that was stopped, failed or killed."""
+    from experiments.robot.stopped import result_of_checkpoint
+
+    if folder.status == "stopped" and (folder.path / "result.json").exists():
+        return
+    with folder.lock(), stdout_to_stderr(), make_progress(quiet=True) as progress:
+        result = result_of_checkpoint(folder, progress)
+    if result is not None:
+        say(f"warning: {result.warnings[0]}")
+
+
+_CONCLUDED = {"penetrate": _conclude_stopped, "mujoco": _conclude_robot}
+_NOTHING = {"penetrate": " (no bed is whole)", "mujoco": " (it has no checkpoint)"}
 
 
 def _now(folder: RunFolder) -> float:

@@ -139,7 +139,7 @@ def _forms_over(results: Sequence[Mapping[str, Any]], mean: Mapping[str, float])
     if len(every) < len(results):  # another surface, or a bed that an older hedgebed has computed
         return NO_FORMS
     forms = with_grains(Forms(numbers=every[0]), mean)
-    for name, one in forms.numbers["ranges"].items():
+    for name, one in forms.numbers.get("ranges", {}).items():
         one["low"] = min(bed["ranges"][name]["low"] for bed in every)
         one["high"] = max(bed["ranges"][name]["high"] for bed in every)
     words = expected_words(forms.numbers, mean, on_grains=True)

@@ -7,12 +7,13 @@ from experiments.platform.ground_file import with_kept_ground
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
 from experiments.runs.result import Result
-from experiments.runs.whole_runs import whole_run
+from experiments.runs.whole_runs import draw_plots, whole_run
 
 from .energy import growth_warning
 from .on_grains import RobotFollowed, RobotOnBed, report_seconds
 from .plan import keep_files, plan_robot, try_controller
 from .settings import RobotSettings, say
+from .stopped import keep_whole_beds
 
 __all__ = ["check", "resume", "run"]
 
@@ -36,7 +37,12 @@ def _carry_out(settings: RobotSettings, folder: RunFolder, progress: Progress) -
         if len(settings.seeds) > 1:
             from .beds import carry_out_beds  # loads the statistics of SciPy
 
-            return carry_out_beds(settings, plan, folder, progress)
+            try:
+                return carry_out_beds(settings, plan, folder, progress)
+            except KeyboardInterrupt:
+                if keep_whole_beds(settings, folder) is not None:
+                    draw_plots(folder, progress)
+                raise
         if settings.seeds:
             settings = settings.of_bed(settings.seeds[0])
             plan = replace(plan, settings=settings)

@@ -4,13 +4,13 @@ from collections.abc import Collection
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from coupling.robot import LawFeet, RobotRun
 from coupling.robot.soles import FASTEST
 from experiments.grains.spells import spells
 
 from . import say
+from .depths import Array, depths_of_parts, ups
 from .plan import RobotPlan
 
 __all__ = [
@@ -25,8 +25,6 @@ DAMPED = "power-irreversible"  # The law with memory whose damping stops a foot 
 NAMES = ("clearance_largest", "clearance_end", "sinkage_largest", "sinkage_end")
 """Of each foot [m]."""
 
-Array = NDArray[np.float64]
-
 
 def heights_of(run: RobotRun) -> Array:
     """Height of the lowest point of each foot over the undisturbed surface at every row [m], shape (row, foot).
@@ -34,7 +32,7 @@ def heights_of(run: RobotRun) -> Array:
     It is negative below the surface.
     """
     feet = run.feet
-    lowest = [foot.bottoms(_ups(feet[:, k, 3:7])) for k, foot in enumerate(run.robot.feet)]
+    lowest = [foot.bottoms(ups(feet[:, k, 3:7])) for k, foot in enumerate(run.robot.feet)]
     return feet[:, :, 2] + np.column_stack(lowest)
 
 
@@ -110,14 +108,10 @@ def _most(losses: dict[str, list[float]]) -> dict[str, Any]:
 
 def too_deep(run: RobotRun, law: str = "spring-damper") -> list[str]:
     """A sentence where a part of a foot went deeper than its law holds, of the part that did so most."""
-    limits, feet = run.ground.depths if isinstance(run.ground, LawFeet) else {}, run.feet
-    found: list[tuple[float, str, float]] = []
-    for k, foot in enumerate(run.robot.feet):
-        ups = _ups(feet[:, k, 3:7])
-        for part in foot.parts:
-            if part.name in limits:
-                depth = -float((feet[:, k, 2] + (part.vertices @ ups.T).min(axis=0)).min())
-                found.append((depth / limits[part.name], part.name, depth))
+    limits = run.ground.depths if isinstance(run.ground, LawFeet) else {}
+    found = [
+        (depth / limits[part.name], part.name, depth) for part, depth in depths_of_parts(run) if part.name in limits
+    ]
     most, name, depth = max(found, default=(0.0, "", 0.0))
     key = "too_deep" if law == "spring-damper" else "too_deep_for"
     return [say(key, law=law, name=name, depth=1e3 * depth, limit=1e3 * limits[name])] if most > 1 else []
@@ -167,9 +161,3 @@ _NOTES = {
     "clearance_largest": "clearance", "clearance_end": "at_end", "sinkage_largest": "foot_sinkage",
     "sinkage_end": "at_end",
 }  # fmt: skip
-
-
-def _ups(turns: Array) -> Array:
-    """The world's upward direction in axes turned by unit quaternions, shape (n, 4): the third row of each matrix."""
-    w, x, y, z = turns.T
-    return np.column_stack([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)])

@@ -8,11 +8,14 @@ the error that the form of the law makes, and no bound.
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 from experiments.runs.types import Json
 from vis.page.numbers import between, foldable, in_one_unit
 
 from . import say
+from .depths import Deepest
+from .flight import REST
 from .laws import given_parameters
 from .plan import RobotPlan, plan_robot
 from .settings import DEFAULT
@@ -31,6 +34,8 @@ LAWS: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("power-irreversible", ()), ("katsuragi-durian", ()), ("bekker", ()),
 )  # fmt: skip
 """Laws that have numbers for sand, with their parameters."""
+OF_LANDING = ("sinkage_largest", "largest_force")
+"""Numbers that a landing after the first flight may decide; the others are those of the push."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,6 +45,10 @@ class OnLaw:
     answer: Answer
     time: float  # Simulated [s]
     rising: bool = False  # Whether it ends on its way up, before it flies: its rise is not known
+    deepest: Deepest | None = None  # The part of a foot that went deepest over the depth to which the law holds
+    deepest_before: Deepest | None = None  # The same until the first flight
+    push_speed: float | None = None  # Of the fastest foot in the ground when the push begins [m/s]
+    fast: bool = False  # Whether a foot was faster than laws were compared with grains
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,10 +108,56 @@ def forms_of(plan: RobotPlan, own: OnLaw, follow: Callable[[RobotPlan], OnLaw], 
     numbers: Json = {
         "laws": {name: one.answer for name, one in runs.items() if not one.rising}, "duration": s.duration,
         "longest": max(one.time for one in runs.values()), "lost": lost,
-        "rising": [name for name, one in runs.items() if one.rising],
+        "rising": [name for name, one in runs.items() if one.rising], "fast": own.fast,
+        "beyond": _beyond(runs, still=math.sqrt(2 * plan.numbers["gravity"].value * REST)),
+        "beyond_later": _beyond_later(runs),
     }  # fmt: skip
-    ends = [] if own.rising else [{name: one[end] for name, one in sure.items()} for end in ("low", "high")]
+    held = {} if own.rising else _held(numbers, {here: sure}).get(here, {})
+    ends = [{name: one[end] for name, one in held.items()} for end in ("low", "high")]
     return _ranges(numbers, own.answer, ends, on_grains=False)
+
+
+def _beyond(runs: Mapping[str, OnLaw], *, still: float) -> dict[str, str]:
+    """Law -> why none of its numbers is to be quoted, of those outside the range that they hold in.
+
+    A foot went deeper than its law holds before the first flight. Or it still moved when the push began, faster than
+    ``still`` [m/s], where it was at rest on another law: the push then meets another state of the robot.
+    """
+    found = {}
+    rested = any(one.push_speed is not None and one.push_speed <= still for one in runs.values())
+    for name, one in runs.items():
+        if one.rising:
+            continue
+        why = []
+        if one.deepest_before is not None and one.deepest_before.beyond:
+            why.append(_too_deep(one.deepest_before))
+        if rested and one.push_speed is not None and one.push_speed > still:
+            why.append(say("beyond_speed", speed=one.push_speed))
+        if why:
+            found[name] = say("and").join(why)
+    return found
+
+
+def _beyond_later(runs: Mapping[str, OnLaw]) -> dict[str, str]:
+    """Law -> why its numbers of `OF_LANDING` are not to be quoted: a foot goes deeper than the law holds."""
+    deep = {name: one.deepest for name, one in runs.items() if not one.rising}
+    return {name: _too_deep(one) for name, one in deep.items() if one is not None and one.beyond}
+
+
+def _held(numbers: Json, found: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
+    """Law -> those of its numbers that hold; laws without any are left out. ``numbers``: as of `Forms`."""
+    beyond, later = numbers.get("beyond", ()), numbers.get("beyond_later", ())
+    return {
+        law: {name: value for name, value in values.items() if law not in later or name not in OF_LANDING}
+        for law, values in found.items()
+        if law not in beyond
+    }
+
+
+def _too_deep(one: Deepest) -> str:
+    """How deep a foot went, and to which depth its law holds, in words."""
+    times, most = one.depth / one.diameter, one.limit / one.diameter
+    return say("beyond_depth", name=one.name, depth=1e3 * one.depth, times=times, most=most)
 
 
 def with_grains(laws: Forms, best: Answer, *, depth: float | None = None) -> Forms:
@@ -119,15 +174,20 @@ def with_grains(laws: Forms, best: Answer, *, depth: float | None = None) -> For
 def _ranges(numbers: Json, best: Answer, more: Sequence[Answer], *, on_grains: bool) -> Forms:
     """The ranges over the answers of ``laws`` in `numbers` and `more`, around the answer `best` of the run.
 
-    Where the robot is on its way up at the end on all of them there are none.
+    Laws in ``beyond`` are not in them. Where no law is left there are none.
     """
-    answers = numbers["laws"]
-    if not answers:
+    if not numbers["laws"]:
         return Forms(words=tuple(map(foldable, _left_out(numbers))))
+    answers = _held(numbers, numbers["laws"])
+    if not answers:
+        numbers = {name: value for name, value in numbers.items() if name != "ranges"}
+        words = expected_words(numbers, best, on_grains=on_grains)
+        return Forms(numbers=numbers, words=tuple(map(foldable, words)))
     ranges = {}
     for name in best:
         values = [answer[name] for answer in (*answers.values(), *more) if name in answer]
-        ranges[name] = entry(name, best[name], min(values), max(values))
+        if len(values) > on_grains:  # of one law at least, beside the bed
+            ranges[name] = entry(name, best[name], min(values), max(values))
     numbers = {**numbers, "ranges": ranges}
     words = expected_words(numbers, best, on_grains=on_grains)
     return Forms(numbers=numbers, words=tuple(map(foldable, words)))
@@ -138,23 +198,27 @@ def expected_words(numbers: Json, best: Answer, *, on_grains: bool) -> list[str]
 
     ``numbers``: as of `Forms`. ``best``: answer of the run, on grains (`on_grains`) or on a law.
     """
-    answers, ranges = numbers["laws"], numbers["ranges"]
+    answers, ranges = numbers["laws"], numbers.get("ranges", {})
     told = "highest" if best["longest_flight"] > 0 else "sinkage_largest"
-    unit, one = ANSWER[told], ranges[told]
-    shown = in_one_unit([answer[told] for answer in answers.values()], unit, widest=(one["low"], one["high"]))
-    if told == "highest":
-        no_hop, stay = say("no_hop"), [answer["longest_flight"] == answer[told] == 0 for answer in answers.values()]
-        shown = [no_hop if stays else number for stays, number in zip(stay, shown, strict=True)]
-    each = "; ".join(f"{law} {number}" for law, number in zip(answers, shown, strict=True))
-    words = {"what": say(f"called_{told}"), "ends": between(one["low"], one["high"], unit), "each": each}
-    near = next((law for law in (_named(DEFAULT, (DROPPED_INERTIA,)), DEFAULT) if law in answers), None)
-    said = [say("forms_with_grains" if on_grains else "forms_of_laws", **words), *_left_out(numbers)]
-    if near is not None:
-        softer = on_grains and best["sinkage_largest"] > answers[near]["sinkage_largest"]
-        of_grains = "softer_grains" if softer else "expected_of_grains"
-        said.append(say(of_grains if on_grains else "expected_of_laws", law=near))
+    beyond = {**(numbers.get("beyond_later", {}) if told in OF_LANDING else {}), **numbers.get("beyond", {})}
+    later = [law for law in numbers.get("beyond_later", ()) if law not in beyond]
+    each, ends = _shown(told, answers, ranges.get(told))
+    what = say(f"called_{told}")
+    near = [law for law in (_named(DEFAULT, (DROPPED_INERTIA,)), DEFAULT) if law in answers]
+    held = "; ".join(f"{law} {number}" for law, number in each.items() if law not in beyond)
+    key = "forms_with_grains" if on_grains else "forms_of_laws"
+    said = [say(key, what=what, ends=ends, each=held)] if told in ranges else [say("forms_of_none", what=what)]
+    if beyond:
+        reasons = "; ".join(f"{law} {each[law]} ({why})" for law, why in beyond.items() if law in each)
+        said.append(say("forms_beyond", each=reasons))
+    if later:
+        said.append(say("forms_beyond_later", laws="; ".join(later)))
+    said += _left_out(numbers)
+    if near and told in ranges:
+        softer = on_grains and best["sinkage_largest"] > answers[near[0]]["sinkage_largest"]
+        said += _expected(near[0], on_grains=on_grains, softer=softer, fast=numbers.get("fast", False))
     bed_depth = numbers.get("bed_depth", math.inf)
-    deeper = [law for law, answer in answers.items() if answer["sinkage_largest"] > bed_depth]
+    deeper = [law for law, answer in answers.items() if answer["sinkage_largest"] > bed_depth and law not in beyond]
     said += [say("deeper_than_bed", laws="; ".join(deeper), depth=1e3 * bed_depth)] if deeper else []
     duration = numbers.get("duration")
     if duration and any(answer["longest_flight"] > 0 for answer in (best, *answers.values())):
@@ -162,6 +226,26 @@ def expected_words(numbers: Json, best: Answer, *, on_grains: bool) -> list[str]
         more = say("forms_longer", longest=longest) if longest > 1.01 * duration else ""
         said.append(say("forms_until", duration=duration, more=more))
     return said
+
+
+def _shown(name: str, answers: Mapping[str, Answer], over: Json | None) -> tuple[dict[str, str], str]:
+    """Law -> this number of its answer, and the ends of the range `over` the laws, all in one unit."""
+    unit, values = ANSWER[name], [answer[name] for answer in answers.values()]
+    low, high = (over["low"], over["high"]) if over is not None else (min(values), max(values))
+    shown = dict(zip(answers, in_one_unit(values, unit, widest=(low, high)), strict=True))
+    if name == "highest":
+        stay = (law for law, answer in answers.items() if answer["longest_flight"] == answer[name] == 0)
+        shown |= dict.fromkeys(stay, say("no_hop"))
+    return shown, between(low, high, unit)
+
+
+def _expected(law: str, *, on_grains: bool, softer: bool, fast: bool) -> list[str]:
+    """On which side of `law` real sand is expected, in a sentence: of grains that carry more, under a fast foot."""
+    if not on_grains:
+        return [say("fast_on_laws")] if fast else [say("laws_alone")]
+    if softer:
+        return [say("softer_grains", law=law)]
+    return [say("expected_of_grains", law=law)] if fast else []
 
 
 def _left_out(numbers: Json) -> list[str]:

@@ -27,6 +27,7 @@ from experiments.grains.softening import run_limit
 from experiments.runs.folder import RunFolder
 from experiments.runs.progress import Progress
 from experiments.runs.result import Result
+from experiments.runs.whole_runs import draw_plots
 from rigid.spatial.quaternions import to_matrix
 
 from . import say
@@ -40,7 +41,7 @@ from .result import RobotFrames, conclude, deepest_at_start, write_series_of
 from .settings import RobotSettings
 from .sure import sure_of_law
 
-__all__ = ["RobotFollowed", "RobotForecast", "RobotOnBed", "report_seconds"]
+__all__ = ["RobotFollowed", "RobotForecast", "RobotOnBed", "marked_stopped", "report_seconds"]
 
 SEEN = 200  # Moments of the forecast at which the extent of the feet is taken
 WIDE = 4.0
@@ -53,6 +54,7 @@ DEEPER = 1.3
 0.7 to 1.25 times as deep (docs/notes/mujoco.md). This law is the nearest to grains."""
 SPARE = 0.2  # Share of the way and depth of the feet that the advised bed has more than it needs
 FEWEST_ACROSS = 5.0  # Grains across the widest part of a foot, below which it is refused [1]
+FEWEST_ROWS = 3  # Of a run that is stopped, from which on it has a result [1]
 POLYGON = 0.01  # Share by which a foot may be narrower than that: the outline of a ball is a polygon [1]
 
 
@@ -92,7 +94,25 @@ class RobotFollowed(Followed[RobotRun]):
         used, own = run.robot.step, run.robot.control_step
         if used < (1 - 1e-6) * own:
             progress.message(say("shorter_step", used=1e3 * used, own=1e3 * own, macro=1e3 * run.macro_step))
-        return super().finish(run, folder, progress)
+        try:
+            return super().finish(run, folder, progress)
+        except KeyboardInterrupt:
+            if not run.done and len(run.columns["time"]) >= FEWEST_ROWS:
+                self.write_so_far(run, folder)
+                draw_plots(folder, progress)
+                progress.message(say("stopped_report", report=folder.path / "report.html"))
+            raise
+
+    def write_so_far(self, run: RobotRun, folder: RunFolder) -> Result:
+        """Write series and result of a run as far as it has come, marked as stopped; without ranges over laws."""
+        so_far = say("stopped_at", time=run.time, duration=run.duration)
+        result = marked_stopped(self.conclude_alone(run, folder.path), so_far)
+        folder.write_result(result)
+        return result
+
+    def conclude_alone(self, run: RobotRun, folder: Path) -> Result:
+        """As `conclude`, without the runs on other laws."""
+        return conclude(self.settings, self.plan, run, folder)
 
     def notice(self, run: RobotRun) -> str | None:
         """Once: that what is fixed to a foot is in the ground; half way: that the actuators have given no work."""
@@ -105,7 +125,7 @@ class RobotFollowed(Followed[RobotRun]):
         return f"note: {say('idle_so_far', time=run.time)}" if idle(self.plan, run) else None
 
     def conclude(self, run: RobotRun, folder: Path) -> Result:
-        own = on_law(run)
+        own = on_law(run, self.plan)
         sure, said = sure_of_law(self.plan, own.answer, self._answer_of)
         forms = forms_of(self.plan, own, self._long_enough, sure=sure)
         return conclude(self.settings, self.plan, run, folder, sure=sure, sure_words=said, forms=forms)
@@ -120,12 +140,19 @@ class RobotFollowed(Followed[RobotRun]):
         """The same until the robot is in flight or at rest."""
         run = RobotFollowed(plan.settings, plan).run_on_law()
         follow_on(run)
-        return on_law(run)
+        return on_law(run, plan)
 
 
 def _stepping(settings: RobotSettings) -> Mapping[str, Any]:
     """How the master steps the run."""
     return {name: getattr(settings, name) for name in ("substeps", "extrapolation", "iterations")}
+
+
+def marked_stopped(result: Result, why: str) -> Result:
+    """The same result with the status "stopped", and ``why`` in its title and as its first warning."""
+    return result.model_copy(
+        update={"status": "stopped", "title": f"{result.title}: {why}", "warnings": [why, *result.warnings]}
+    )
 
 
 def report_seconds(settings: RobotSettings) -> float:
@@ -417,10 +444,18 @@ class RobotOnBed(RobotFollowed, OnLoweredBed[RobotSettings, RobotRun, RobotForec
         law = self.settings.default_law
         if law == "spring-damper":
             return NO_FORMS
-        return forms_of(self.plan.on_law(law), on_law(self.beside), self._long_enough, sure={})
+        plan = self.plan.on_law(law)
+        return forms_of(plan, on_law(self.beside, plan), self._long_enough, sure={})
 
     def conclude(self, run: RobotRun, folder: Path) -> Result:
-        forms = with_grains(self.forms, answer_of_run(run), depth=self.settings.bed_size[2])
+        return self._concluded(
+            run, folder, with_grains(self.forms, answer_of_run(run), depth=self.settings.bed_size[2])
+        )
+
+    def conclude_alone(self, run: RobotRun, folder: Path) -> Result:
+        return self._concluded(run, folder, NO_FORMS)
+
+    def _concluded(self, run: RobotRun, folder: Path, forms: Forms) -> Result:
         return conclude(
             self.settings, self.told, run, folder, beside=self.beside, softening=self.softening(),
             across=self.narrowest / self.settings.grain, forms=forms,

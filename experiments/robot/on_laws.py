@@ -7,9 +7,12 @@ duration. In flight MuJoCo continues it without the ground (`experiments.robot.f
 
 from coupling.robot import RobotRun
 
-from .feet import feet_reached, heights_of
-from .flight import REST, at_rest, find_flights, rising, stays
+from .depths import deepest_part
+from .feet import feet_reached, heights_of, too_fast
+from .flight import REST, Array, Flights, at_rest, find_flights, rising, stays
 from .forms import OnLaw
+from .plan import RobotPlan
+from .pushes import foot_speed_at_push
 from .result import quantities_of
 from .sure import answer_of
 
@@ -21,7 +24,7 @@ PARTS = 4  # Of a duration, after each of which a robot may have come to its end
 
 def answer_of_run(run: RobotRun) -> dict[str, float]:
     """The answer of a run."""
-    return dict(on_law(run).answer)
+    return _answer(run)[0]
 
 
 def follow_on(run: RobotRun) -> None:
@@ -45,13 +48,24 @@ def follow_on(run: RobotRun) -> None:
             return
 
 
-def on_law(run: RobotRun) -> OnLaw:
+def on_law(run: RobotRun, plan: RobotPlan) -> OnLaw:
     """What a run on a law leaves for the range over the laws."""
+    answer, heights, flights = _answer(run)
+    launch = flights.rows[0][0] + 1 if flights.rows else None
+    return OnLaw(
+        answer=answer, time=run.time, rising=rising(run, flights), deepest=deepest_part(run, plan.diameters),
+        deepest_before=deepest_part(run, plan.diameters, launch),
+        push_speed=foot_speed_at_push(run, heights, flights), fast=bool(too_fast(plan, run, heights)),
+    )  # fmt: skip
+
+
+def _answer(run: RobotRun) -> tuple[dict[str, float], Array, Flights]:
+    """The answer of a run, with heights and flights as of `find_flights`."""
     heights = heights_of(run)
     flights = find_flights(run, heights)
     hop = not stays(run, flights)
     answer = answer_of(quantities_of(run, heights, flights), feet_reached(run, heights), hop=hop)
-    return OnLaw(answer=answer, time=run.time, rising=rising(run, flights))
+    return answer, heights, flights
 
 
 def _finished(run: RobotRun, part: float) -> bool:

@@ -37,8 +37,10 @@ from .feet import (
 )
 from .flight import APART, Flights, at_end, find_flights, launched, pushes_off, rising, stays, to_landing
 from .forms import NO_FORMS, Forms
+from .joints import beyond_range
 from .laws import of_sand
 from .plan import RobotPlan
+from .pushes import force_of, push_numbers, push_words, swing_warning
 from .settings import RobotSettings
 
 __all__ = ["RobotFrames", "conclude", "deepest_at_start", "write_series_of"]
@@ -178,20 +180,7 @@ def conclude(
     sentences = [*known, *_sentences(run, heights, flights), *([] if sure or forms.words else told), *plan.notes]
     if run.energy_residual > MOST_RESIDUAL:
         title, sentences = say("title_invalid", title=title), [say("invalid"), *sentences]
-    warnings: list[str | None] = [
-        say("idle", time=run.time) if idle(plan, run) else None,
-        *plan.warnings_of_run, balance_warning(settings, run), grains.unsettled_warning(run.master),
-        say("unstable", load=run.load, most=run.most_load) if run.load > run.most_load else None,
-        *buried_words(run),
-        say("went_below", name=run.lowest_other[1], depth=-1e3 * run.lowest_other[0])
-        if run.lowest_other[0] < -BELOW and run.lowest_other[1] != run.buried.name else None,
-        _cut_off(run, heights, flights) if flights.at_end else None, pushes_off(run, flights),
-        *bounce_warning(run, crater_losses(run, heights, apart=APART), plan.law),
-        *(too_deep(run, plan.law) if plan.fitted is None else []),
-        *([] if settings.on_grains else too_fast(plan, run, heights, forms.numbers.get("laws", ()))),
-    ]  # fmt: skip
-    if plan.fitted is not None:
-        warnings += [say("beyond_range", sentence=said, file=plan.fitted) for said in _beyond(plan, run)]
+    warnings = _warnings(settings, plan, run, heights, flights, forms)
     result: Json = {
         "title": title, "status": "done", "quantities": quantities_of(run, heights, flights),
         "departures": {"sentences": sentences},
@@ -231,6 +220,28 @@ def conclude(
     return Result.make("mujoco", **result)
 
 
+def _warnings(
+    settings: RobotSettings, plan: RobotPlan, run: RobotRun, heights: Array, flights: Flights, forms: Forms
+) -> list[str | None]:
+    """The warnings of a run on any ground; None for one that does not apply."""
+    bounces = bounce_warning(run, crater_losses(run, heights, apart=APART), plan.law)
+    warnings: list[str | None] = [
+        say("idle", time=run.time) if idle(plan, run) else None,
+        *plan.warnings_of_run, balance_warning(settings, run), grains.unsettled_warning(run.master),
+        say("unstable", load=run.load, most=run.most_load) if run.load > run.most_load else None,
+        *buried_words(run),
+        say("went_below", name=run.lowest_other[1], depth=-1e3 * run.lowest_other[0])
+        if run.lowest_other[0] < -BELOW and run.lowest_other[1] != run.buried.name else None,
+        _cut_off(run, heights, flights) if flights.at_end else None, pushes_off(run, flights),
+        *(bounces or swing_warning(run, heights, flights, plan)), *beyond_range(run),
+        *(too_deep(run, plan.law) if plan.fitted is None else []),
+        *([] if settings.on_grains else too_fast(plan, run, heights, forms.numbers.get("laws", ()))),
+    ]  # fmt: skip
+    if plan.fitted is not None:
+        warnings += [say("beyond_range", sentence=said, file=plan.fitted) for said in _beyond(plan, run)]
+    return warnings
+
+
 def _ground_named(plan: RobotPlan) -> str:
     """The ground, in words; with the material only where the law is of it."""
     if plan.settings.on_grains:
@@ -261,7 +272,6 @@ def quantities_of(run: RobotRun, heights: Array, flights: Flights) -> dict[str, 
     `heights`: as of `heights_of`. `flights`: as of `find_flights`.
     """
     rows, balance, touched = run.columns, run.balance_numbers, flights.touched
-    force = np.linalg.norm([rows[name] for name in ("fx", "fy", "fz")], axis=0)
     found: dict[str, Number] = {
         "displacement_x": (float(rows["x"][-1] - rows["x"][0]), "m", say("displacement")),
         "displacement_y": (float(rows["y"][-1] - rows["y"][0]), "m", "likewise"),
@@ -275,13 +285,13 @@ def quantities_of(run: RobotRun, heights: Array, flights: Flights) -> dict[str, 
         "sinkage_largest": (float(rows["sinkage"].max()), "m", "of the lowest point of any foot"),
         "sinkage_end": (float(rows["sinkage"][-1]), "m", "the same, at the end"),
         **feet_quantities(feet_reached(run, heights)),
-        "largest_force": (float(force.max()), "N", say("whole_force")),
+        "largest_force": (float(force_of(run).max()), "N", say("whole_force")),
         "actuator_work": (float(rows["actuator_work"][-1]), "J", say("actuator_work")),
         "ground_work": (float(rows["taken"][-1]), "J", say("ground_work")),
         "stability": (run.load, "1", say("stability")),
         "energy_residual": (run.energy_residual, "1", say("residual")),
     }
-    found |= _ballistic(run, heights, flights, found)
+    found |= _ballistic(run, heights, flights, found) | push_numbers(run, flights)
     notes = {"coupling_residual": say("coupling"), "exchange_residual": say("exchange")}
     if isinstance(run.ground, BedFeet):
         notes |= {"dissipation_reversal": say("reversal")}
@@ -390,7 +400,4 @@ def _sentences(run: RobotRun, heights: Array, flights: Flights) -> list[str]:
     sinkage, time = rows["sinkage"], rows["time"]
     deepest = int(sinkage.argmax())
     told.append(say("sank", depth=1e3 * sinkage[deepest], time=time[deepest], end=1e3 * sinkage[-1]))
-    if flown and deepest > flown[0][0]:
-        begin = flown[0][0]
-        told.append(say("sank_in_push", depth=1e3 * sinkage[:begin].max(), launch=time[begin]))
-    return told
+    return [*told, *push_words(run, flights)]

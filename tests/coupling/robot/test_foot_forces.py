@@ -29,6 +29,23 @@ def stepped(model, names, duration, *, step=2e-4, before=None, **options):
     return data, forces
 
 
+ANKLE = """<mujoco><worldbody><body pos="0 0 0.3"><joint type="slide" axis="0 0 1"/>
+<geom type="box" size="0.06 0.06 0.04" mass="2.5"/><body pos="0 0 -0.27">
+<geom name="foot" type="sphere" size="0.025" mass="0.1"/><site name="ankle"/></body></body></worldbody>
+<sensor><force site="ankle"/></sensor></mujoco>"""
+
+
+def test_a_force_sensor_does_not_see_the_ground_in_a_loop_of_ones_own_and_does_in_a_run():
+    """A foot of 0.1 kg under 2.5 kg, at rest: the ankle carries 2.5 kg."""
+    law = {"parameters": {"stiffness": 2000.0, "damping": 200.0}}
+    data, forces = stepped(model := mujoco.MjModel.from_xml_string(ANKLE), ["foot"], 0.7, step=5e-4, **law)
+    assert forces.forces(data)["foot"][2] == pytest.approx(2.6 * 9.81, rel=0.02)
+    assert abs(data.sensordata[2]) < 0.1 * 9.81 * 1.1
+    robot = MujocoRobot(model, "foot")
+    RobotRun(robot, LawFeet(robot.feet, time_step=5e-5, **law), duration=0.7).run()
+    assert abs(robot.data.sensordata[2]) == pytest.approx(2.5 * 9.81, rel=0.05)
+
+
 def test_a_ball_comes_to_rest_where_the_spring_carries_it_as_in_a_run():
     data, forces = stepped(model := ball(height=0.06), ["foot"], 1.2, parameters=SOFT)
     mass = float(model.body_mass.sum())

@@ -45,8 +45,12 @@ def test_a_run_that_ends_in_contact_on_its_way_up_goes_on_to_the_flight_and_has_
     cut, whole = run_of(plan), run_of(plan)
     cut.run()
     follow_on(whole)
-    assert on_law(cut).rising and answer_of_run(cut)["highest"] < -0.019 and answer_of_run(cut)["longest_flight"] == 0
-    found = on_law(whole)
+    assert (
+        on_law(cut, plan).rising
+        and answer_of_run(cut)["highest"] < -0.019
+        and answer_of_run(cut)["longest_flight"] == 0
+    )
+    found = on_law(whole, plan)
     assert not found.rising and 0.095 < found.time < 0.2
     assert found.answer["highest"] == pytest.approx(0.0, abs=5e-4)
     assert found.answer["longest_flight"] == pytest.approx(0.128, rel=0.02)
@@ -54,7 +58,8 @@ def test_a_run_that_ends_in_contact_on_its_way_up_goes_on_to_the_flight_and_has_
 
 def test_a_robot_that_has_landed_is_followed_until_it_is_at_rest_and_one_that_falls_still_is_not(planned):
     landed = run_of(planned(surface="sand", height=0.02, duration=0.1))
-    falling, down = (run_of(planned(**BRICK, duration=duration)) for duration in (0.03, 0.07))
+    plan = planned(**BRICK, duration=0.03)
+    falling, down = run_of(plan), run_of(planned(**BRICK, duration=0.07))
     follow_on(landed)
     assert 0.1 < landed.time < 0.3
     speeds = np.gradient(landed.columns["z"], landed.columns["time"])
@@ -62,14 +67,14 @@ def test_a_robot_that_has_landed_is_followed_until_it_is_at_rest_and_one_that_fa
     follow_on(falling)
     down.run()
     assert falling.time == pytest.approx(0.03, abs=1e-3)
-    assert not on_law(falling).rising and not on_law(down).rising
+    assert not on_law(falling, plan).rising and not on_law(down, plan).rising
 
 
 def test_a_robot_that_has_hopped_is_not_followed_into_its_next_push():
     """The second push of the leg begins at 0.75 s."""
-    run = run_of(plan_robot(RobotSettings(**HOPPER, duration=0.8)))
+    run = run_of(plan := plan_robot(RobotSettings(**HOPPER, duration=0.8)))
     follow_on(run)
-    assert run.time == pytest.approx(0.8, abs=1e-3) and not on_law(run).rising
+    assert run.time == pytest.approx(0.8, abs=1e-3) and not on_law(run, plan).rising
     assert answer_of_run(run)["highest"] > 0.03
 
 
@@ -82,7 +87,7 @@ def test_a_controller_that_knows_the_duration_alone_ends_the_law_there(planned):
     run = run_of(plan)
     follow_on(run)
     assert run.time == pytest.approx(0.085, abs=1e-3) and run.done and len(run.columns["z"]) == len(run.feet)
-    assert on_law(run).rising
+    assert on_law(run, plan).rising
 
 
 def test_a_run_of_its_own_that_ends_so_is_warned_of(planned, tmp_path):
@@ -114,7 +119,7 @@ def test_a_run_that_ends_in_the_crater_of_its_launch_flies_as_a_longer_one_does(
     (begin, _), *_ = find_flights(whole, heights_of(whole)).rows
     out = begin + int(np.argmax(heights[begin:] > 0))
     cut, short = followed(float(whole.columns["time"][out - 15]))
-    assert heights_of(cut)[-1, 0] < -2e-3 and find_flights(cut, heights_of(cut)).at_end and not on_law(cut).rising
+    assert heights_of(cut)[-1, 0] < -2e-3 and find_flights(cut, heights_of(cut)).at_end and not short["rising"]
     launches = [
         [said for said in one["departures"]["sentences"] if "first flight begins" in said] for one in (short, longer)
     ]

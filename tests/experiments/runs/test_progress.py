@@ -235,6 +235,24 @@ def test_a_bed_in_preparation_goes_by_time(clock):
     assert progress.fraction is not None
 
 
+@pytest.mark.parametrize(("power", "down"), [(1.0, 0.60), (2.0, 0.30)])
+def test_grains_that_fall_at_a_constant_pace_are_as_far_as_they_have_fallen(power, down, clock):
+    """On a busy machine a step takes the same time however few grains touch, on a quiet one more in a denser bed.
+
+    The share of the fall that is over is then that of its time: (fallen / 0.82)^power.
+    """
+    bed = BedProgress(progress := Progress(clock=clock), "bed", lambda: False, clock=clock)
+    bed.stage("rain", 1.0)
+    began, told = clock.now, {}
+    for fallen in (0.03 * k for k in range(1, 28)):
+        clock.now = began + 300.0 * fallen**power
+        bed.update(fallen)
+        told[round(fallen, 2)] = progress.stage_fraction
+    for fallen in (0.3, 0.6):
+        assert told[fallen] == pytest.approx(down * (fallen / 0.82) ** power, rel=0.15)
+    assert told[0.81] == pytest.approx(down, rel=0.2)  # it nears its end ever more slowly
+
+
 def test_a_cost_below_nothing_is_refused():
     with pytest.raises(ValueError, match="less than nothing"):
         Progress().plan({"dig": -1.0})
