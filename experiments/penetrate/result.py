@@ -85,8 +85,7 @@ def conclude(
     ]
     part = [say("whole_beds", count=len(facts), of=stopped_of)] if stopped_of else []
     warnings = [*part, *warnings_of(findings), *filter(None, found)]
-    departures = departures_in_words(findings)
-    entries = findings.run_entries(notes)
+    departures, entries = departures_in_words(findings), findings.run_entries(notes)
     law = kept_law(settings, folder.path)
     if law is not None:
         more, said, numbers = run_beside(law, units, runs, findings.models, folder)
