@@ -96,7 +96,7 @@ def _stated_words(row: Mapping[str, Any]) -> str:
         return say("stated_open", name=name, at=at, stated=stated)
     change = row["difference"]["value"] / row["stated"]["value"]
     by = say("stated_by", share=100 * abs(change), more="more" if change > 0 else "less")
-    agrees = say("stated_agrees" if row["agrees"] else "stated_differs")
+    agrees = say("stated_agrees") if row["agrees"] else say("stated_differs")
     return say("stated_one", name=name, at=at, stated=stated, alone=number_words(row["alone"]), by=by, agrees=agrees)
 
 
