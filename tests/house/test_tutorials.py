@@ -58,6 +58,6 @@ def test_the_trials_of_the_tutorial_are_diagnosed_as_it_says(tmp_path, monkeypat
     assert main(["diagnose", "mine", "--out", "runs/mine", "--quiet"]) == 0
     result = Result.load(tmp_path / "runs/mine")
     power = result["quantities"]["depth-hardening.hardening_power"]
-    assert power["value"] == pytest.approx(0.5, abs=4 * 0.0016)  # four of the standard errors that the page states
+    assert power["value"] == pytest.approx(0.5, abs=4 * 0.0036)  # four of the standard errors that the page states
     text = (FOLDER / "own-trials.md").read_text(encoding="utf-8")
-    assert f"{power['value']:.4f}" in text
+    assert f"{power['value']:.3f}" in text
