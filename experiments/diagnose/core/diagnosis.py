@@ -45,6 +45,7 @@ def diagnose(
     other = deepcopy(problem) if problem.loose else None
     found = _Course(problem, asked).run()
     if found.verdict == "unknown" and other is not None:
+        asked.tell(f"unknown: once more without {problem.loose}", 0.0)
         other.base = tuple(parameter for parameter in other.base if parameter.name != problem.loose)
         found = _Course(other, asked).run()
     return too_noisy.as_contract(found)
