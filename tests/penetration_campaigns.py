@@ -3,10 +3,14 @@
 from pathlib import Path
 
 import numpy as np
+import pytest
 from scipy.integrate import solve_ivp
 
 from experiments.campaign import Campaign, PenetrationCampaign, Recording, write_campaign
 from experiments.campaign.digests import DIGESTS
+from experiments.diagnose import experiment
+from experiments.diagnose.experiment import diagnose_campaign
+from experiments.diagnose.settings import DiagnoseSettings
 
 MASS, STIFFNESS, DAMPING, GRAVITY = 0.5, 900.0, 4.0, 9.80665
 DEPTH_STD, FORCE_STD, ACCEL_STD = 1e-4, 0.05, 0.1
@@ -61,6 +65,20 @@ def campaign_of(trials, *, stiffness=1.05 * STIFFNESS, damping=0.9 * DAMPING, do
         "trial": tuple(tables),
     }  # fmt: skip
     return Campaign(PenetrationCampaign.model_validate(text), recordings)
+
+
+def run_and_diagnosis(folder: Path, campaign: Campaign):
+    """The result of `hedgebed diagnose` on a campaign, in ``folder / "run"``, and the diagnosis behind it."""
+    kept = []
+
+    def keep(*campaign, **options):
+        kept.append(diagnose_campaign(*campaign, **options))
+        return kept[-1]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(experiment, "diagnose_campaign", keep)
+        settings = DiagnoseSettings(campaign=str(saved(folder / "campaign", campaign)))
+        return experiment.run(settings, folder / "run"), kept[0]
 
 
 def on_firm_ground(problem):

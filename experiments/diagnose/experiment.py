@@ -9,7 +9,6 @@ from pathlib import Path
 from threadpoolctl import threadpool_limits
 
 from experiments.campaign import Campaign, read_campaign
-from experiments.campaign.tables import SURFACE
 from experiments.check import find_implausible, find_unstated, missing_sensors, said_once, template_warning
 from experiments.diagnose.settings import DiagnoseSettings
 from experiments.runs.folder import RunFolder
@@ -177,7 +176,7 @@ def _result(found: Diagnosis, diagnosis: Json, made_up: str | None) -> Result:
             "the base model",
             found.bounds_before,
             "it bends them because something is missing",
-            {SURFACE} if found.forms else {},
+            {found.problem.loose} if found.forms else {},
         ),
         ("the best model", found.bounds_after if found.forms else (), beside, {}),
     ):

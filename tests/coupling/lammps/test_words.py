@@ -210,12 +210,17 @@ def test_without_lammps_the_message_says_what_to_install(monkeypatch):
         process.find_lammps()
 
 
+def programs_in(folder, monkeypatch, texts):
+    """Programs of these names and contents, which are found before those of the machine."""
+    for name, text in texts.items():
+        (folder / name).write_bytes(text)
+        (folder / name).chmod(0o755)
+    monkeypatch.setenv("PATH", f"{folder}:/usr/bin:/bin")
+    monkeypatch.setattr(sys, "executable", str(folder / "python"))
+
+
 def test_a_lammps_without_granular_is_named(monkeypatch, tmp_path):
-    for name in ("lmp", "mpiexec"):
-        (tmp_path / name).write_text("#!/bin/sh\necho atom bond\n")
-        (tmp_path / name).chmod(0o755)
-    monkeypatch.setenv("PATH", f"{tmp_path}:/usr/bin:/bin")
-    monkeypatch.setattr(sys, "executable", str(tmp_path / "python"))
+    programs_in(tmp_path, monkeypatch, dict.fromkeys(("lmp", "mpiexec"), b"#!/bin/sh\necho atom bond\n"))
     with pytest.raises(LammpsMissingError, match="built without GRANULAR"):
         process.find_lammps()
 
@@ -223,23 +228,16 @@ def test_a_lammps_without_granular_is_named(monkeypatch, tmp_path):
 @pytest.mark.parametrize("broken", ["lmp", "mpiexec"])
 def test_a_program_that_does_not_run_is_named(broken, monkeypatch, tmp_path):
     words = {"lmp": "granular wall/gran/region nve/sphere ave/time"}
-    for name in ("lmp", "mpiexec"):
-        text = b"\x7fELF not for this machine" if name == broken else b"#!/bin/sh\necho " + words.get(name, "").encode()
-        (tmp_path / name).write_bytes(text)
-        (tmp_path / name).chmod(0o755)
-    monkeypatch.setenv("PATH", f"{tmp_path}:/usr/bin:/bin")
-    monkeypatch.setattr(sys, "executable", str(tmp_path / "python"))
+    texts = {name: b"#!/bin/sh\necho " + words.get(name, "").encode() for name in ("lmp", "mpiexec")}
+    programs_in(tmp_path, monkeypatch, texts | {broken: b"\x7fELF not for this machine"})
     with pytest.raises(LammpsMissingError, match=rf"{tmp_path / broken} does not run: .*Errno 8.*hedgebed\[lammps\]"):
         process.check_ranks.__wrapped__(2)
 
 
 def test_a_lammps_that_fails_at_once_is_not_called_one_without_granular(monkeypatch, tmp_path):
     """As where MPI finds no room in the folder of temporary files."""
-    for name in ("lmp", "mpiexec"):
-        (tmp_path / name).write_text("#!/bin/sh\necho OUT-OF-RESOURCE >&2\nexit 1\n")
-        (tmp_path / name).chmod(0o755)
-    monkeypatch.setenv("PATH", f"{tmp_path}:/usr/bin:/bin")
-    monkeypatch.setattr(sys, "executable", str(tmp_path / "python"))
+    fails = b"#!/bin/sh\necho OUT-OF-RESOURCE >&2\nexit 1\n"
+    programs_in(tmp_path, monkeypatch, dict.fromkeys(("lmp", "mpiexec"), fails))
     with pytest.raises(LammpsMissingError, match=r"lmp does not run: exit status 1: OUT-OF-RESOURCE;"):
         process.find_lammps()
 

@@ -9,13 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from golden import golden
-from penetration_campaigns import FORCE_STD, campaign_of, saved
+from penetration_campaigns import FORCE_STD, campaign_of, run_and_diagnosis, saved
 
 from experiments.campaign import Recording, read_campaign, read_model
 from experiments.campaign.tables import ERRORS_NOTE, OTHERS_NOTE, SCATTER_NOTE
 from experiments.check import find_implausible
 from experiments.check.shifted import shifted_depths
-from experiments.diagnose import experiment
 from experiments.diagnose.core.near import likelier, near_models, nearest_each, other_forms
 from experiments.diagnose.core.rivals import folds_of, predict
 from experiments.diagnose.experiment import diagnose_campaign
@@ -28,7 +27,6 @@ from experiments.diagnose.report.gaps import Gaps
 from experiments.diagnose.report.sentences import _how_often, behind_words
 from experiments.diagnose.report.summary import summary_sentences
 from experiments.diagnose.report.to_use import SERIES, near_model_sentences, peak_sentences, use_sentences
-from experiments.diagnose.settings import DiagnoseSettings
 from rigid.series import read_series
 
 SHARES = (1.04, 1.06, 1.08, 1.10)
@@ -61,17 +59,7 @@ def plates(**changes):
 def diagnosed(tmp_path_factory):
     """The run folder of the plates, n2 being off by `OFF`, its result and the diagnosis behind it."""
     folder = tmp_path_factory.mktemp("plates")
-    campaign = saved(folder / "campaign", plates(n2={"zero": OFF}))
-    kept = []
-
-    def keep(*campaign, **options):
-        kept.append(diagnose_campaign(*campaign, **options))
-        return kept[-1]
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(experiment, "diagnose_campaign", keep)
-        found = experiment.run(DiagnoseSettings(campaign=str(campaign)), folder / "run")
-    return folder / "run", found, kept[0]
+    return folder / "run", *run_and_diagnosis(folder, plates(n2={"zero": OFF}))
 
 
 @pytest.fixture(scope="module")

@@ -5,13 +5,11 @@ import math
 
 import pytest
 from golden import golden
-from penetration_campaigns import DAMPING, STIFFNESS, campaign_of, driven_trial, saved
+from penetration_campaigns import DAMPING, STIFFNESS, campaign_of, driven_trial, run_and_diagnosis, saved
 
-from experiments.diagnose import experiment
 from experiments.diagnose.core.stated import _difference, beside_stated, without_prior
 from experiments.diagnose.experiment import diagnose_campaign
 from experiments.diagnose.report.to_use import stated_sentences
-from experiments.diagnose.settings import DiagnoseSettings
 from rigid.intervals import student
 
 STATED = {"value": 1100.0, "std": 11.0, "unit": "N/m"}
@@ -54,18 +52,8 @@ def test_what_the_trials_do_not_determine_has_no_comparison():
 def known(tmp_path_factory):
     """The diagnosis and the run folder of pushes whose K is stated 2 % too large, with an error of 1 %."""
     folder = tmp_path_factory.mktemp("known")
-    kept = []
-
-    def keep(*campaign, **options):
-        kept.append(diagnose_campaign(*campaign, **options))
-        return kept[-1]
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(experiment, "diagnose_campaign", keep)
-        result = experiment.run(
-            DiagnoseSettings(campaign=str(saved(folder / "c", pushes((0.01, 0.2))))), folder / "run"
-        )
-    return kept[0], result, folder / "run"
+    result, found = run_and_diagnosis(folder, pushes((0.01, 0.2)))
+    return found, result, folder / "run"
 
 
 def test_what_pushes_give_without_the_stated_numbers_is_what_they_give_with_none(known, tmp_path):
